@@ -1,0 +1,1 @@
+//! Periodic packing of particles, with a certificate that none overlap.

@@ -1,0 +1,2 @@
+//! The program `stereology`.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Profiles of particles from a photograph of a section: binder, labels, colours, residual.

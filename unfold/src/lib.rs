@@ -1,0 +1,1 @@
+//! Unfolding: from profiles per area to particles per volume.

@@ -1,0 +1,1 @@
+//! The solid texture: particles, colours and residual, asked at any point; slices, sections, voxels.

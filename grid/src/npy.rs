@@ -1,0 +1,141 @@
+//! NumPy's array file: a header of 64-byte multiples, then the samples.
+
+use crate::element::Element;
+use crate::{GridError, VolumeShape};
+use ndarray::{ArrayD, IxDyn, ShapeBuilder};
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// Header of a C-ordered volume, version 1.0, padded to a multiple of 64 bytes.
+pub(crate) fn header<T: Element>(shape: &VolumeShape) -> Vec<u8> {
+    let sizes: Vec<String> = shape.sizes().iter().map(ToString::to_string).collect();
+    let mut text = format!(
+        "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}",
+        T::NPY,
+        sizes.join(", ")
+    );
+    let unpadded = MAGIC.len() + 4 + text.len() + 1;
+    text.push_str(&" ".repeat(unpadded.next_multiple_of(64) - unpadded));
+    text.push('\n');
+    let length = u16::try_from(text.len()).expect("four sizes of at most 20 digits fit in a version 1.0 header");
+    [MAGIC, &[1, 0], &length.to_le_bytes(), text.as_bytes()].concat()
+}
+
+/// Reads a `.npy` file of exactly the sample type `T`, of any number of axes, C or Fortran order.
+///
+/// The header is checked against the length of the file before memory is asked for, so a damaged file cannot ask for more than it holds.
+///
+/// # Errors
+///
+/// [`GridError::Io`] if the file cannot be read; [`GridError::NotNpy`] if it is no `.npy` file, holds another type or another number of bytes than its header says.
+///
+/// # Examples
+///
+/// ```
+/// # use std::ops::ControlFlow;
+/// # use stereology_grid::{Format, VolumeShape, read_npy, write_volume};
+/// # let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("ids.npy");
+/// let shape = VolumeShape { nz: 1, ny: 2, nx: 3, channels: 1 };
+/// write_volume::<u32>(&file, Format::Npy, shape, [1.0; 3], |_, mut slab| {
+///     slab[[1, 2, 0]] = 70_000;
+///     ControlFlow::Continue(())
+/// })?;
+/// assert_eq!(read_npy::<u32>(&file)?[[0, 1, 2]], 70_000);
+/// let refused = read_npy::<u8>(&file).unwrap_err();
+/// assert!(refused.to_string().contains("holds samples of type <u4"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_npy<T: Element>(path: impl AsRef<Path>) -> Result<ArrayD<T>, GridError> {
+    let path = path.as_ref();
+    let file = File::open(path).map_err(GridError::io(path))?;
+    let length = file.metadata().map_err(GridError::io(path))?.len();
+    let wrong = |reason: String| GridError::NotNpy {
+        path: path.to_owned(),
+        reason,
+    };
+    let mut reader = BufReader::new(file);
+    let header = Header::read(&mut reader)
+        .map_err(GridError::io(path))?
+        .map_err(&wrong)?;
+    if header.descr != T::NPY {
+        return Err(wrong(format!(
+            "holds samples of type {}, not {}; convert it with numpy's astype",
+            header.descr,
+            T::NPY
+        )));
+    }
+    let sample = size_of::<T>() as u64;
+    let bytes = header
+        .shape
+        .iter()
+        .try_fold(sample, |bytes, &n| bytes.checked_mul(n as u64));
+    let held = length.saturating_sub(header.length);
+    if bytes != Some(held) {
+        return Err(wrong(format!(
+            "says {:?} samples of {sample} bytes but holds {held} bytes; it is damaged or cut off",
+            header.shape
+        )));
+    }
+    let mut data = Vec::new();
+    reader.read_to_end(&mut data).map_err(GridError::io(path))?;
+    let shape = IxDyn(&header.shape).set_f(header.fortran_order);
+    ArrayD::from_shape_vec(shape, T::decode(&data)).map_err(|_| wrong("changed while it was read".into()))
+}
+
+struct Header {
+    descr: String,
+    fortran_order: bool,
+    shape: Vec<usize>,
+    length: u64,
+}
+
+impl Header {
+    /// Outer error: the file cannot be read; inner: what is wrong with the header.
+    fn read(reader: &mut impl Read) -> io::Result<Result<Self, String>> {
+        let mut start = [0; 10];
+        let mut text = Vec::new();
+        let mut length = 10;
+        let not_npy = || Ok(Err("is no .npy file".to_string()));
+        if let Err(e) = reader.read_exact(&mut start) {
+            return if e.kind() == io::ErrorKind::UnexpectedEof {
+                not_npy()
+            } else {
+                Err(e)
+            };
+        }
+        if !start.starts_with(MAGIC) {
+            return not_npy();
+        }
+        let mut size = u64::from(u16::from_le_bytes([start[8], start[9]]));
+        if start[6] > 1 {
+            let mut rest = [0; 2];
+            if reader.read_exact(&mut rest).is_err() {
+                return not_npy();
+            }
+            size += u64::from(u16::from_le_bytes(rest)) << 16;
+            length += 2;
+        }
+        length += reader.take(size).read_to_end(&mut text)? as u64;
+        let text = String::from_utf8_lossy(&text);
+        Ok(Self::parse(&text, length).ok_or_else(|| "has a header that cannot be understood".to_string()))
+    }
+
+    fn parse(text: &str, length: u64) -> Option<Self> {
+        let after = |key: &str| text.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
+        let descr = after("descr")?.strip_prefix('\'')?.split_once('\'')?.0.to_string();
+        let fortran_order = after("fortran_order")?.starts_with("True");
+        let sizes = after("shape")?.strip_prefix('(')?.split_once(')')?.0;
+        let sizes = sizes.split(',').map(str::trim).filter(|size| !size.is_empty());
+        let shape = sizes.map(|size| size.parse().ok()).collect::<Option<Vec<usize>>>()?;
+        Some(Self {
+            descr,
+            fortran_order,
+            shape,
+            length,
+        })
+    }
+}

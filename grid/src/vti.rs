@@ -1,0 +1,30 @@
+//! VTK XML image data: the voxels as cell data, appended raw.
+
+use crate::VolumeShape;
+use crate::element::Element;
+
+/// Everything before the samples, their number of bytes (`UInt64`) included.
+pub(crate) fn header<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> Vec<u8> {
+    let VolumeShape { nz, ny, nx, channels } = *shape;
+    let [sx, sy, sz] = spacing;
+    let name = if channels == 3 { "rgb" } else { "values" };
+    let mut header = format!(
+        r#"<?xml version="1.0"?>
+<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+  <ImageData WholeExtent="0 {nx} 0 {ny} 0 {nz}" Origin="0 0 0" Spacing="{sx} {sy} {sz}">
+    <Piece Extent="0 {nx} 0 {ny} 0 {nz}">
+      <CellData Scalars="{name}">
+        <DataArray type="{}" Name="{name}" NumberOfComponents="{channels}" format="appended" offset="0"/>
+      </CellData>
+    </Piece>
+  </ImageData>
+  <AppendedData encoding="raw">
+   _"#,
+        T::VTK
+    )
+    .into_bytes();
+    header.extend_from_slice(&bytes.to_le_bytes());
+    header
+}
+
+pub(crate) const FOOTER: &[u8] = b"\n  </AppendedData>\n</VTKFile>\n";

@@ -1,0 +1,6 @@
+//! Files written by the crate, read back by readers that are not ours.
+#![expect(clippy::unwrap_used, reason = "a failing test panics")]
+
+mod damaged;
+mod formats;
+mod whole_or_nothing;

@@ -1,0 +1,3 @@
+//! Laws of the transforms, judged by the sum that defines them.
+
+mod laws;

@@ -1,2 +1,59 @@
-//! The program `stereology`.
-fn main() {}
+//! The program `stereology`: a photograph of a cut through a material in, the solid it came from out.
+//!
+//! Every command is a module of [`commands`]: its arguments, its help and a thin `run` that calls the libraries and fills an [`answer::Answer`].
+
+#![allow(dead_code)] // while the commands land one by one
+
+mod answer;
+mod arguments;
+mod commands;
+mod failure;
+mod manual;
+mod outputs;
+mod profile_table;
+mod progress;
+mod report;
+mod values;
+mod warnings;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::Program;
+use crate::failure::Failure;
+
+fn main() -> ExitCode {
+    let program = Program::parse();
+    match run(&program) {
+        Ok(code) => code,
+        Err(failure) => {
+            let failure = if progress::stopped() {
+                Failure::stopped()
+            } else {
+                failure
+            };
+            let _ = writeln!(io::stderr(), "error: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn run(program: &Program) -> Result<ExitCode, Failure> {
+    let everywhere = &program.everywhere;
+    progress::stop_on_ctrl_c();
+    if let Some(threads) = everywhere.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| Failure::run(format!("--threads {threads}: the threads cannot be started ({error})")))?;
+    }
+    match commands::run(&program.command, everywhere)? {
+        Some(answer) => {
+            progress::go_on()?;
+            Ok(answer.print(everywhere))
+        }
+        None => Ok(ExitCode::SUCCESS),
+    }
+}

@@ -1,0 +1,109 @@
+//! The commands, one module each.
+
+pub mod export;
+pub mod kmatrix;
+pub mod pack;
+pub mod pyramid;
+pub mod render;
+pub mod segment;
+pub mod slice;
+pub mod synthesize;
+pub mod texture;
+pub mod unfold;
+
+use std::ffi::OsString;
+
+use clap::{Args, Subcommand};
+
+use crate::answer::Answer;
+use crate::arguments::Everywhere;
+use crate::failure::Failure;
+use crate::manual;
+
+/// What holds for all commands, for `docs/cli.md`.
+pub const CONVENTIONS: &str = "\
+- Lengths are pixels unless `--scale UNITS_PER_PIXEL` is given; meshes are in mesh units.
+- The `size` of a profile is the diameter of the circle with its area; the size of a particle is the diameter of the circle with the area of its largest \
+section, so a sphere's size is its diameter.
+- Size bins are (a, b]: N equal bins of (0, max-size] by `--bins N`, or `--edges a,b,...`, or `--spacing geometric`.
+- SHAPE is `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`, `rock:SEED`, or a mesh file (`.obj`, `.stl`, \
+`.ply`). `SHAPE=FRACTION` gives the share of the particles of that shape. Only proportions matter to unfolding and packing.
+- Arrays are u8 with axes (z, y, x, channel) in C order: `.npy` as is; `.nrrd` with sizes `3 nx ny nz`; `.vti` with one array `rgb` of three components, x \
+fastest; `.tif` with one RGB page a z.
+- `--json` prints one object whose first key is `schema`, `stereology.<command>/1`, and which has `warnings`, a list of `{code, message}` (codes below).
+- Colours are averaged as stored (sRGB-encoded values / 255), as in the paper.";
+
+/// A command and its options.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Synthesize(synthesize::Synthesize),
+    Segment(segment::Segment),
+    Kmatrix(kmatrix::Kmatrix),
+    Unfold(unfold::Unfold),
+    Pack(pack::Pack),
+    Texture(texture::Texture),
+    Pyramid(pyramid::Pyramid),
+    Slice(slice::Slice),
+    Render(render::Render),
+    Export(export::Export),
+    /// Not available yet: a mesh with the solid's texture as vertex colours
+    Carve(Later),
+    /// Not available yet: a shape as a mesh file
+    Shape(Later),
+    /// Not available yet: measures of a finished solid
+    Measure(Later),
+    /// Not available yet: a solid from one picture without particles
+    Exemplar(Later),
+    /// Not available yet: stone grown around measured particles
+    Grow(Later),
+    /// Not available yet: contact distributions of a microgeometry
+    Contact(Later),
+    /// Not available yet: stochastic displacement of a mesh
+    Displace(Later),
+    /// Not available yet: a solid explored interactively
+    Explore(Later),
+    /// Prints docs/cli.md
+    #[command(hide = true)]
+    Manual,
+}
+
+/// Arguments of a command that is not built yet: anything.
+#[derive(Args, Debug)]
+pub struct Later {
+    /// Not read yet
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    rest: Vec<OsString>,
+}
+
+/// Runs a command; `None` if it has printed its answer itself.
+pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>, Failure> {
+    let later = |name: &str, later: &Later| {
+        let _ = &later.rest;
+        Err(Failure::not_available(format!("the command `{name}`")))
+    };
+    match command {
+        Command::Synthesize(options) => options.run(everywhere).map(Some),
+        Command::Segment(options) => options.run(everywhere).map(Some),
+        Command::Kmatrix(options) => options.run(everywhere).map(Some),
+        Command::Unfold(options) => options.run(everywhere).map(Some),
+        Command::Pack(options) => options.run(everywhere).map(Some),
+        Command::Texture(options) => options.run(everywhere).map(Some),
+        Command::Pyramid(options) => options.run(everywhere).map(Some),
+        Command::Slice(options) => options.run(everywhere).map(Some),
+        Command::Render(options) => options.run(everywhere).map(Some),
+        Command::Export(options) => options.run(everywhere).map(Some),
+        Command::Carve(rest) => later("carve", rest),
+        Command::Shape(rest) => later("shape", rest),
+        Command::Measure(rest) => later("measure", rest),
+        Command::Exemplar(rest) => later("exemplar", rest),
+        Command::Grow(rest) => later("grow", rest),
+        Command::Contact(rest) => later("contact", rest),
+        Command::Displace(rest) => later("displace", rest),
+        Command::Explore(rest) => later("explore", rest),
+        Command::Manual => {
+            use std::io::Write;
+            let _ = std::io::stdout().write_all(manual::page().as_bytes());
+            Ok(None)
+        }
+    }
+}

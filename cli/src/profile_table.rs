@@ -1,0 +1,1 @@
+//! The table of profiles that `stereology unfold` reads.

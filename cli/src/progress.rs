@@ -1,0 +1,80 @@
+//! Progress bars on a terminal, and Ctrl-C.
+
+use std::io::{self, IsTerminal, Write};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::failure::Failure;
+
+static STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// From now on Ctrl-C asks the running step to stop; a second one ends the program at once.
+pub fn stop_on_ctrl_c() {
+    // Without a handler Ctrl-C ends the program at once, which is safe too: outputs are renamed only when complete.
+    let _ = ctrlc::set_handler(|| {
+        if STOPPED.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+        let _ = writeln!(
+            io::stderr(),
+            "\nstopping at the next safe point; Ctrl-C again stops at once"
+        );
+    });
+}
+
+/// Was Ctrl-C pressed?
+pub fn stopped() -> bool {
+    STOPPED.load(Ordering::SeqCst)
+}
+
+/// An error if Ctrl-C was pressed: to be asked before anything is published.
+pub fn go_on() -> Result<(), Failure> {
+    if stopped() { Err(Failure::stopped()) } else { Ok(()) }
+}
+
+/// The progress of one step.
+#[derive(Debug)]
+pub struct Step {
+    bar: ProgressBar,
+}
+
+impl Step {
+    /// Begins a step called `name`; its bar is seen only if stderr is a terminal and `quiet` is not set.
+    pub fn begin(name: &str, quiet: bool) -> Self {
+        if quiet || !io::stderr().is_terminal() {
+            return Self {
+                bar: ProgressBar::hidden(),
+            };
+        }
+        let bar = ProgressBar::new(1000);
+        if let Ok(style) = ProgressStyle::with_template("{prefix:12} {bar:40} {percent:>3} % {elapsed:>4} {msg}") {
+            bar.set_style(style);
+        }
+        bar.set_prefix(name.to_owned());
+        bar.tick();
+        Self { bar }
+    }
+
+    /// Told how far the step is (0 to 1); breaks after Ctrl-C.
+    pub fn at(&self, done: f64) -> ControlFlow<()> {
+        self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
+        if stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// Says below the bar what is being done.
+    pub fn say(&self, message: &str) {
+        self.bar.set_message(message.to_owned());
+    }
+}
+
+impl Drop for Step {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

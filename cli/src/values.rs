@@ -1,0 +1,202 @@
+//! Values of options: positive numbers, lists, colours, shapes with their shares. A wrong value is wrong usage and says what is right.
+
+use std::str::FromStr;
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("a finite number above zero is needed".to_owned()),
+    }
+}
+
+/// A finite number, zero or above.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
+        _ => Err("a finite number, zero or above, is needed".to_owned()),
+    }
+}
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("a finite number is needed".to_owned()),
+    }
+}
+
+/// A number strictly between 0 and 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number > 0.0 && number < 1.0 => Ok(number),
+        _ => Err("a number between 0 and 1 is needed".to_owned()),
+    }
+}
+
+/// A count from 1 to a million.
+pub fn count(text: &str) -> Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(number @ 1..=1_000_000) => Ok(number),
+        _ => Err("a whole number from 1 to 1000000 is needed".to_owned()),
+    }
+}
+
+/// A number of bins, from 1 to 1000.
+pub fn bins(text: &str) -> Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(number @ 1..=1000) => Ok(number),
+        _ => Err("a whole number of bins from 1 to 1000 is needed".to_owned()),
+    }
+}
+
+/// Edges of bins, `a,b,...`: at least two, from zero up, each above the one before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edges(pub Vec<f64>);
+
+impl FromStr for Edges {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let edges = text.split(',').map(not_negative).collect::<Result<Vec<_>, _>>()?;
+        if edges.len() < 2 || edges.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err("at least two edges are needed, each above the one before, such as 0,2,4,8".to_owned());
+        }
+        Ok(Self(edges))
+    }
+}
+
+/// A colour `R,G,B`, each 0 to 255.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Colour(pub [u8; 3]);
+
+impl FromStr for Colour {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Result<Vec<u8>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        match parts.as_deref() {
+            Ok(&[r, g, b]) => Ok(Self([r, g, b])),
+            _ => Err("a colour is three whole numbers from 0 to 255, such as 120,110,100".to_owned()),
+        }
+    }
+}
+
+/// Three finite numbers `X,Y,Z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triple(pub [f64; 3]);
+
+impl FromStr for Triple {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
+        match *parts {
+            [x, y, z] => Ok(Self([x, y, z])),
+            _ => Err("three numbers are needed, such as 0,0,1".to_owned()),
+        }
+    }
+}
+
+/// One, two or three numbers of samples: `N`, `H,W` or `NZ,NY,NX`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Extent(pub Vec<usize>);
+
+impl FromStr for Extent {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Result<Vec<usize>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        match parts {
+            Ok(parts) if (1..=3).contains(&parts.len()) && parts.iter().all(|&n| n > 0) => Ok(Self(parts)),
+            _ => Err("one, two or three whole numbers above zero are needed: N, H,W or NZ,NY,NX".to_owned()),
+        }
+    }
+}
+
+/// A particle shape and its share of the particles: `SHAPE` or `SHAPE=FRACTION`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeShare {
+    /// `sphere`, `box:A,B,C`, a mesh file, ...
+    pub shape: String,
+    /// Share by number of particles, if given.
+    pub fraction: Option<f64>,
+}
+
+impl FromStr for ShapeShare {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.is_empty() {
+            return Err("a shape is needed, such as sphere".to_owned());
+        }
+        match text.rsplit_once('=') {
+            // A file name may hold `=`: only a number after it is a share.
+            Some((shape, fraction)) if fraction.parse::<f64>().is_ok() => {
+                let fraction = positive(fraction).map_err(|error| format!("the share after `=`: {error}"))?;
+                Ok(Self {
+                    shape: shape.to_owned(),
+                    fraction: Some(fraction),
+                })
+            }
+            _ => Ok(Self {
+                shape: text.to_owned(),
+                fraction: None,
+            }),
+        }
+    }
+}
+
+/// Shares that sum to one; a shape without a share gets an equal part of what the others leave.
+pub fn shares(shapes: &[ShapeShare]) -> Result<Vec<f64>, String> {
+    let missing = shapes.iter().filter(|shape| shape.fraction.is_none()).count();
+    let given: f64 = shapes.iter().filter_map(|shape| shape.fraction).sum();
+    if missing == 0 {
+        return Ok(shapes
+            .iter()
+            .filter_map(|shape| shape.fraction)
+            .map(|fraction| fraction / given)
+            .collect());
+    }
+    if given >= 1.0 {
+        return Err("the shares given sum to 1 or more and leave nothing for the shapes without one".to_owned());
+    }
+    let rest = (1.0 - given) / missing as f64;
+    Ok(shapes.iter().map(|shape| shape.fraction.unwrap_or(rest)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Colour, Edges, Extent, ShapeShare, Triple, positive, shares};
+
+    #[test]
+    fn numbers_are_finite_and_in_range() {
+        for wrong in ["0", "-3", "nan", "inf", "1e400", "", "abc"] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(positive("1e3"), Ok(1000.0));
+    }
+
+    #[test]
+    fn lists_are_checked() {
+        assert_eq!("0,1,2.5".parse(), Ok(Edges(vec![0.0, 1.0, 2.5])));
+        assert!("0,1,1".parse::<Edges>().is_err() && "1".parse::<Edges>().is_err());
+        assert_eq!("1,2,255".parse(), Ok(Colour([1, 2, 255])));
+        assert!("1,2,256".parse::<Colour>().is_err() && "1,2".parse::<Colour>().is_err());
+        assert_eq!("0,0,1".parse(), Ok(Triple([0.0, 0.0, 1.0])));
+        assert_eq!("32,64".parse(), Ok(Extent(vec![32, 64])));
+        assert!("0".parse::<Extent>().is_err() && "1,2,3,4".parse::<Extent>().is_err());
+    }
+
+    #[test]
+    fn shapes_have_shares() {
+        let parse = |text: &str| text.parse::<ShapeShare>().unwrap();
+        assert_eq!(parse("box:1,2,3=0.25").fraction, Some(0.25));
+        assert_eq!(parse("a=b.obj").shape, "a=b.obj");
+        assert!("sphere=0".parse::<ShapeShare>().is_err());
+        assert_eq!(shares(&[parse("sphere=3"), parse("rock:1=1")]).unwrap(), [0.75, 0.25]);
+        assert_eq!(shares(&[parse("sphere"), parse("rock:1")]).unwrap(), [0.5, 0.5]);
+        assert_eq!(shares(&[parse("sphere=0.2"), parse("rock:1")]).unwrap(), [0.2, 0.8]);
+        assert!(shares(&[parse("sphere=1"), parse("rock:1")]).is_err());
+    }
+}

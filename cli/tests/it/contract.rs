@@ -1,0 +1,81 @@
+//! Help, exit codes, and what is not built yet.
+
+use assert_cmd::Command;
+
+fn stereology(arguments: &[&str]) -> (i32, String, String) {
+    let output = Command::cargo_bin("stereology")
+        .unwrap()
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn help_teaches() {
+    for command in [
+        "synthesize",
+        "segment",
+        "kmatrix",
+        "unfold",
+        "pack",
+        "texture",
+        "pyramid",
+        "slice",
+        "render",
+        "export",
+    ] {
+        let (code, out, _) = stereology(&[command, "--help"]);
+        assert_eq!(code, 0);
+        assert!(
+            out.contains("Example: stereology ") && out.contains("--seed"),
+            "{command}:\n{out}"
+        );
+    }
+}
+
+#[test]
+fn wrong_usage_exits_2() {
+    for wrong in [
+        &["nonsense"] as &[_],
+        &[],
+        &["kmatrix"],
+        &["kmatrix", "sphere", "--bins", "0"],
+        &["unfold", "a.csv", "--area=nan"],
+    ] {
+        let (code, out, error) = stereology(wrong);
+        assert_eq!((code, out.as_str()), (2, ""), "{wrong:?}");
+        assert!(error.len() > 10);
+    }
+}
+
+#[test]
+fn what_is_not_built_says_so() {
+    for later in [
+        &["carve", "out", "a.obj", "-o", "a.glb"] as &[_],
+        &["measure", "--anything", "3"],
+        &["exemplar", "a.png", "--size", "64"],
+        &["grow"],
+        &["contact", "a.png", "--json"],
+        &["displace"],
+        &["explore"],
+        &["shape", "sphere", "-o", "a.obj"],
+        &["pack", "--constant", "--mode", "anneal", "-o", "a.json"],
+        &["texture", "a.png", "--mode", "oriented", "--size", "8", "-o", "a.npy"],
+    ] {
+        let (code, _, error) = stereology(later);
+        assert_eq!(code, 2, "{later:?}: {error}");
+        assert!(error.contains("not available yet"), "{later:?}: {error}");
+    }
+}
+
+#[test]
+fn the_manual_is_the_help() {
+    let (_, manual, _) = stereology(&["manual"]);
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/cli.md")).unwrap();
+    assert!(
+        manual == page,
+        "docs/cli.md is not what the help says: `cargo run -- manual > docs/cli.md`"
+    );
+}

@@ -1,9 +1,9 @@
 //! The sample types of our volumes and what each format calls them.
 
-use crate::tiff_stack::{Page, write_page};
 use std::io::{self, Seek, Write};
 use tiff::TiffResult;
-use tiff::encoder::{TiffEncoder, TiffKind, colortype};
+use tiff::encoder::{DirectoryEncoder, TiffKind};
+use tiff::tags::SampleFormat;
 
 /// A sample type of a volume: `u8` (colours, categories), `u32` (ids), `f32` (distances, residuals).
 ///
@@ -24,12 +24,13 @@ pub trait Encoded: Copy + Default + Send + Sync + 'static {
     const VTK: &'static str;
     /// Writes the samples as little-endian bytes.
     fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()>;
-    /// Writes the samples as a TIFF page.
+    /// TIFF's sample format.
+    const TIFF_SAMPLE: SampleFormat;
+    /// Writes the samples into a TIFF file, in its byte order, and says where they begin.
     fn write_page<W: Write + Seek, K: TiffKind>(
-        tiff: &mut TiffEncoder<W, K>,
-        page: &Page,
+        tiff: &mut DirectoryEncoder<'_, W, K>,
         samples: &[Self],
-    ) -> TiffResult<()>;
+    ) -> TiffResult<u64>;
     /// The samples of little-endian bytes; a rest shorter than a sample is left out.
     fn decode(bytes: &[u8]) -> Vec<Self>;
 }
@@ -38,20 +39,17 @@ impl Encoded for u8 {
     const NPY: &'static str = "|u1";
     const NRRD: &'static str = "uint8";
     const VTK: &'static str = "UInt8";
+    const TIFF_SAMPLE: SampleFormat = SampleFormat::Uint;
 
     fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(samples)
     }
 
     fn write_page<W: Write + Seek, K: TiffKind>(
-        tiff: &mut TiffEncoder<W, K>,
-        page: &Page,
+        tiff: &mut DirectoryEncoder<'_, W, K>,
         samples: &[Self],
-    ) -> TiffResult<()> {
-        match page.channels {
-            1 => write_page::<colortype::Gray8, W, K>(tiff, page, samples),
-            _ => write_page::<colortype::RGB8, W, K>(tiff, page, samples),
-        }
+    ) -> TiffResult<u64> {
+        tiff.write_data(samples)
     }
 
     fn decode(bytes: &[u8]) -> Vec<Self> {
@@ -60,11 +58,12 @@ impl Encoded for u8 {
 }
 
 macro_rules! four_bytes {
-    ($type:ty, $npy:literal, $nrrd:literal, $vtk:literal, $grey:ident, $rgb:ident) => {
+    ($type:ty, $npy:literal, $nrrd:literal, $vtk:literal, $tiff:ident) => {
         impl Encoded for $type {
             const NPY: &'static str = $npy;
             const NRRD: &'static str = $nrrd;
             const VTK: &'static str = $vtk;
+            const TIFF_SAMPLE: SampleFormat = SampleFormat::$tiff;
 
             fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()> {
                 let mut bytes = [0; 4 * 1024];
@@ -78,14 +77,10 @@ macro_rules! four_bytes {
             }
 
             fn write_page<W: Write + Seek, K: TiffKind>(
-                tiff: &mut TiffEncoder<W, K>,
-                page: &Page,
+                tiff: &mut DirectoryEncoder<'_, W, K>,
                 samples: &[Self],
-            ) -> TiffResult<()> {
-                match page.channels {
-                    1 => write_page::<colortype::$grey, W, K>(tiff, page, samples),
-                    _ => write_page::<colortype::$rgb, W, K>(tiff, page, samples),
-                }
+            ) -> TiffResult<u64> {
+                tiff.write_data(samples)
             }
 
             fn decode(bytes: &[u8]) -> Vec<Self> {
@@ -98,5 +93,5 @@ macro_rules! four_bytes {
     };
 }
 
-four_bytes!(u32, "<u4", "uint32", "UInt32", Gray32, RGB32);
-four_bytes!(f32, "<f4", "float", "Float32", Gray32Float, RGB32Float);
+four_bytes!(u32, "<u4", "uint32", "UInt32", Uint);
+four_bytes!(f32, "<f4", "float", "Float32", IEEEFP);

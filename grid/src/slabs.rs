@@ -104,7 +104,7 @@ pub fn write_volume<T: Element>(
     };
     let out = file.writer();
     if format == Format::Tiff {
-        tiff_stack::write(out, &shape, spacing, bytes, slab_to, |e| GridError::io(path)(e))?;
+        tiff_stack::write(out, path, &shape, spacing, bytes, slab_to)?;
     } else {
         out.write_all(&header).map_err(GridError::io(path))?;
         for z in 0..nz {

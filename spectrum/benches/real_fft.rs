@@ -1,5 +1,7 @@
 //! One real transform and back: the floor under everything the pyramid does.
 
+#![allow(missing_docs, reason = "criterion's macro makes a public function")]
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::{Array2, Array3};
 use std::hint::black_box;
@@ -15,12 +17,12 @@ fn real_fft(c: &mut Criterion) {
     let image = Array2::from_shape_fn((1024, 1024), |(y, x)| ((y * 31 + x * 17) % 101) as f32);
     let fft = RealFft::new(&[1024, 1024]).expect("sizes are positive");
     group.bench_function("forward_1024x1024_f32", |b| {
-        b.iter(|| fft.forward(black_box(image.view())))
+        b.iter(|| fft.forward(black_box(image.view())));
     });
     let volume = Array3::from_shape_fn((128, 128, 128), |(z, y, x)| ((z * 7 + y * 31 + x * 17) % 101) as f32);
     let fft = RealFft::new(&[128, 128, 128]).expect("sizes are positive");
     group.bench_function("forward_128x128x128_f32", |b| {
-        b.iter(|| fft.forward(black_box(volume.view())))
+        b.iter(|| fft.forward(black_box(volume.view())));
     });
     let slice: Vec<f32> = (0..128 * 128).map(|i| ((i * 17) % 101) as f32).collect();
     let fft = RealFft::new(&[128, 128]).expect("sizes are positive");

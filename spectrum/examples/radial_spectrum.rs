@@ -2,6 +2,8 @@
 //!
 //! `cargo run --example radial_spectrum`
 
+#![allow(clippy::print_stdout, reason = "an example prints its result")]
+
 use ndarray::Array2;
 use stereology_spectrum::{SpectrumError, periodic_component, radial_spectrum};
 

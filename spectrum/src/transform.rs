@@ -169,18 +169,7 @@ impl<T: Real> RealFft<T> {
         let mut spectrum = Array::from_elem(dim, Complex::new(T::zero(), T::zero()));
         let values = contiguous(&field);
         let bins = contiguous_mut(&mut spectrum);
-        if self.samples() < PARALLEL_FROM {
-            self.forward_into(values, bins, &mut self.work());
-        } else {
-            let (n, half) = self.row_lengths();
-            bins.par_chunks_mut(half * LANES)
-                .zip(values.par_chunks(n * LANES))
-                .for_each_init(
-                    || self.work(),
-                    |work, (bins, values)| self.rows_forward_into(values, bins, work),
-                );
-            self.across.transform_parallel(bins, half, FftDirection::Forward);
-        }
+        self.forward_into(values, bins, &mut self.work());
         Ok(spectrum)
     }
 
@@ -202,47 +191,58 @@ impl<T: Real> RealFft<T> {
         let mut field = Array::from_elem(dim, T::zero());
         let values = contiguous_mut(&mut field);
         let bins = contiguous_mut(&mut spectrum);
-        if self.samples() < PARALLEL_FROM {
-            self.inverse_into(bins, values, &mut self.work());
-        } else {
-            let (n, half) = self.row_lengths();
-            self.across.transform_parallel(bins, half, FftDirection::Inverse);
-            values
-                .par_chunks_mut(n * LANES)
-                .zip(bins.par_chunks_mut(half * LANES))
-                .for_each_init(
-                    || self.work(),
-                    |work, (values, bins)| self.rows_inverse_into(bins, values, work),
-                );
-        }
+        self.inverse_into(bins, values, &mut self.work());
         let scale = T::one() / T::from_f64_lossy(self.samples() as f64);
         field.mapv_inplace(|v| v * scale);
         Ok(field)
     }
 
-    /// Spectrum of a field given and taken as slices in C order, on the calling thread, without allocating.
+    /// Spectrum of a field given and taken as slices in C order. Below 2^17 samples it stays on the calling thread and
+    /// allocates nothing.
     ///
     /// # Panics
     ///
     /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work` is
     /// another transform's.
     pub fn forward_into(&self, field: &[T], spectrum: &mut [Complex<T>], work: &mut Work<T>) {
-        self.rows_forward_into(field, spectrum, work);
-        self.across
-            .transform(spectrum, self.row_lengths().1, FftDirection::Forward, work);
+        let (n, half) = self.row_lengths();
+        if self.samples() < PARALLEL_FROM {
+            self.rows_forward_into(field, spectrum, work);
+            self.across.transform(spectrum, half, FftDirection::Forward, work);
+        } else {
+            spectrum
+                .par_chunks_mut(half * LANES)
+                .zip(field.par_chunks(n * LANES))
+                .for_each_init(
+                    || self.work(),
+                    |work, (bins, values)| self.rows_forward_into(values, bins, work),
+                );
+            self.across.transform_parallel(spectrum, half, FftDirection::Forward);
+        }
     }
 
-    /// Field of a spectrum, **not** divided by the number of samples, on the calling thread, without allocating. The
-    /// spectrum is used up.
+    /// Field of a spectrum, **not** divided by the number of samples. Below 2^17 samples it stays on the calling thread
+    /// and allocates nothing. The spectrum is used up.
     ///
     /// # Panics
     ///
     /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work` is
     /// another transform's.
     pub fn inverse_into(&self, spectrum: &mut [Complex<T>], field: &mut [T], work: &mut Work<T>) {
-        self.across
-            .transform(spectrum, self.row_lengths().1, FftDirection::Inverse, work);
-        self.rows_inverse_into(spectrum, field, work);
+        let (n, half) = self.row_lengths();
+        if self.samples() < PARALLEL_FROM {
+            self.across.transform(spectrum, half, FftDirection::Inverse, work);
+            self.rows_inverse_into(spectrum, field, work);
+        } else {
+            self.across.transform_parallel(spectrum, half, FftDirection::Inverse);
+            field
+                .par_chunks_mut(n * LANES)
+                .zip(spectrum.par_chunks_mut(half * LANES))
+                .for_each_init(
+                    || self.work(),
+                    |work, (values, bins)| self.rows_inverse_into(bins, values, work),
+                );
+        }
     }
 
     fn row_lengths(&self) -> (usize, usize) {

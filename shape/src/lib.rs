@@ -1,1 +1,67 @@
-//! Bodies of particles: closed triangle meshes, spheres, ellipsoids; their volume, surface, mean width, sections, support, distance; particles in a periodic box.
+//! Bodies of particles: what they measure, what planes cut from them, where they are.
+//!
+//! A body is a closed triangle mesh, a sphere or an ellipsoid. Stereology asks few things of it, all answered here:
+//!
+//! - volume V, surface S and the mean width H = (1/4π) Σ edge length × angle: planes hit particles of number density N_V with N_A = H N_V;
+//! - its `size`: the diameter of the circle with the area A of its largest section, √(4 A / π), found by maximisation;
+//! - the profiles of a section: disjoint outlines with their holes, because one particle may show several;
+//! - as a [`UnitBody`] (centroid at the origin, size 1): inside, support, signed distance, in nanoseconds;
+//! - as a [`Particle`]: scaled, turned and moved, world = position + size · R u, in a [`PeriodicBox`].
+//!
+//! Decisions that rounding could spoil (which side of a plane, inside or outside) are exact signs of determinants; measures are sums in
+//! double precision. Nothing is mended in silence: [`ClosedMesh::repairs`] lists it.
+//!
+//! # Examples
+//!
+//! What is the mean caliper diameter of a brick, and how large is it in a photograph at most?
+//!
+//! ```
+//! use stereology_shape::Body;
+//!
+//! let brick = Body::cuboid([10.0, 20.0, 5.0])?;
+//! assert!((brick.mean_width() - 17.5).abs() < 1e-9);
+//! assert!((brick.size() - (4.0 * 20.0 * 125.0_f64.sqrt() / std::f64::consts::PI).sqrt()).abs() < 1e-6);
+//! # Ok::<(), stereology_shape::BodyError>(())
+//! ```
+//!
+//! Is a point of a material inside this turned rock?
+//!
+//! ```
+//! use nalgebra::Point3;
+//! use rand::SeedableRng;
+//! use stereology_shape::{Body, Particle, UnitBody, isotropic_rotation};
+//!
+//! let rock = UnitBody::new(&Body::rock(1));
+//! let orientation = isotropic_rotation(&mut rand_chacha::ChaCha8Rng::seed_from_u64(0));
+//! let particle = Particle { shape: 0, size: 3.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation };
+//! assert!(rock.contains(&particle.to_local(&Point3::new(5.2, 5.0, 4.9))));
+//! assert!(!rock.contains(&particle.to_local(&Point3::new(9.0, 5.0, 5.0))));
+//! ```
+
+mod body;
+mod closed_mesh;
+mod convex;
+mod elliptic;
+mod hull;
+mod inside;
+mod largest_section;
+mod measures;
+mod nearest;
+mod particle;
+mod periodic_box;
+mod primitives;
+mod rock;
+mod section;
+mod topology;
+mod triangle_mesh;
+mod unit_body;
+mod winding;
+
+pub use body::{Body, BodyError, BodyKind};
+pub use closed_mesh::{ClosedMesh, MeshError, Repair};
+pub use hull::{HullError, convex_hull};
+pub use particle::{Particle, isotropic_rotation};
+pub use periodic_box::{BoxError, PeriodicBox};
+pub use section::{SectionPolygon, section_polygons};
+pub use triangle_mesh::TriangleMesh;
+pub use unit_body::UnitBody;

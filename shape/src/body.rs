@@ -1,0 +1,428 @@
+//! The bodies particles are made of, whatever describes them: a closed form or a mesh.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use crate::closed_mesh::{ClosedMesh, MeshError};
+use crate::elliptic::{self, carlson_rg};
+use crate::largest_section::largest_section_area;
+use crate::rock;
+use crate::section::Slicer;
+use crate::triangle_mesh::TriangleMesh;
+
+/// A solid body in its own unit of length and its own place, measured once.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_shape::Body;
+///
+/// let sphere = Body::sphere(2.0)?;
+/// assert_eq!((sphere.mean_width(), sphere.size()), (2.0, 2.0));
+///
+/// let brick = Body::parse("box:1,2,3")?;
+/// assert!((brick.volume() - 6.0).abs() < 1e-12);
+/// assert!((brick.mean_width() - 3.0).abs() < 1e-12);
+/// # Ok::<(), stereology_shape::BodyError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    form: Form,
+    largest_section_area: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Form {
+    Sphere { diameter: f64 },
+    Ellipsoid { axes: Vector3<f64> },
+    Mesh(Arc<ClosedMesh>),
+}
+
+/// What describes a body, for those who have a closed form for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BodyKind<'a> {
+    /// A sphere about the origin.
+    Sphere {
+        /// Its diameter.
+        diameter: f64,
+    },
+    /// An ellipsoid about the origin, its axes along x, y, z.
+    Ellipsoid {
+        /// Half its extent along x, y, z.
+        semi_axes: [f64; 3],
+    },
+    /// Anything else.
+    Mesh(&'a ClosedMesh),
+}
+
+/// Why there is no such body.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BodyError {
+    /// A length is not positive and finite, or too large or small for its cube.
+    #[error("the {what} of a body is a length from 1e-60 to 1e60, not {value}")]
+    Length {
+        /// Which length.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The description starts like a shape, but its numbers are wrong.
+    #[error("{spec:?} is not a shape: write {expected}, numbers separated by commas")]
+    Numbers {
+        /// What was given.
+        spec: String,
+        /// How it is written.
+        expected: &'static str,
+    },
+    /// Neither a shape nor a mesh file.
+    #[error(
+        "{spec:?} is not a shape: write sphere, ellipsoid:A,B,C (semi-axes), box:A,B,C (edges), cylinder:D,L, rock:SEED, or the name of a \
+         mesh file (.obj, .stl, .ply)"
+    )]
+    UnknownShape {
+        /// What was given.
+        spec: String,
+    },
+    /// The triangles enclose no solid.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The triangles of a file enclose no solid.
+    #[error("{path}: {source}")]
+    MeshOf {
+        /// The file.
+        path: String,
+        /// What is wrong with its mesh.
+        source: MeshError,
+    },
+}
+
+/// Sides of the prism that stands for a cylinder.
+const CYLINDER_SIDES: u32 = 128;
+
+impl Body {
+    /// A sphere about the origin.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError::Length`] unless the diameter is a positive finite length.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// assert!((Body::sphere(1.0)?.volume() - std::f64::consts::PI / 6.0).abs() < 1e-15);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn sphere(diameter: f64) -> Result<Self, BodyError> {
+        check_length("diameter", diameter)?;
+        Ok(Self {
+            form: Form::Sphere { diameter },
+            largest_section_area: 0.25 * PI * diameter * diameter,
+        })
+    }
+
+    /// An ellipsoid about the origin with these **semi**-axes along x, y, z.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError::Length`] unless all are positive finite lengths.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let disc = Body::ellipsoid([2.0, 2.0, 0.5])?;
+    /// assert_eq!(disc.size(), 4.0);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn ellipsoid(semi_axes: [f64; 3]) -> Result<Self, BodyError> {
+        for axis in semi_axes {
+            check_length("semi-axis", axis)?;
+        }
+        let axes = Vector3::from(semi_axes);
+        // Division by the smallest, not the product of the two largest found by sorting: the same, shorter.
+        let largest_section_area = PI * (axes.product() / axes.min());
+        Ok(Self {
+            form: Form::Ellipsoid { axes },
+            largest_section_area,
+        })
+    }
+
+    /// A box about the origin with these full edges along x, y, z.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError`] unless all are positive finite lengths and the box is not too flat to have a volume.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let cube = Body::cuboid([1.0; 3])?;
+    /// assert!((cube.largest_section_area() - 2.0_f64.sqrt()).abs() < 1e-9); // through two opposite edges
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn cuboid(edges: [f64; 3]) -> Result<Self, BodyError> {
+        for edge in edges {
+            check_length("edge", edge)?;
+        }
+        Ok(Self::from_mesh(ClosedMesh::try_from(TriangleMesh::cuboid(edges))?))
+    }
+
+    /// A cylinder along z about the origin: a prism of 128 sides with the circle's cross-section area.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError`] unless both are positive finite lengths and the cylinder is not too flat to have a volume.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let can = Body::cylinder(2.0, 1.0)?;
+    /// assert!((can.volume() - std::f64::consts::PI).abs() < 1e-9);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn cylinder(diameter: f64, length: f64) -> Result<Self, BodyError> {
+        check_length("diameter", diameter)?;
+        check_length("length", length)?;
+        Ok(Self::from_mesh(ClosedMesh::try_from(TriangleMesh::cylinder(
+            diameter,
+            length,
+            CYLINDER_SIDES,
+        ))?))
+    }
+
+    /// A convex rock of 18 to 38 faces, about one unit across; the same body for the same seed.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let rock = Body::rock(5);
+    /// assert!(rock.is_convex() && rock == Body::rock(5) && rock != Body::rock(6));
+    /// ```
+    #[must_use]
+    pub fn rock(seed: u64) -> Self {
+        Self::from_mesh(rock::rock(seed))
+    }
+
+    /// The solid inside a closed mesh.
+    ///
+    /// ```
+    /// # use stereology_shape::{Body, ClosedMesh, TriangleMesh};
+    /// let torus = Body::from_mesh(ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.5, 64, 24))?);
+    /// assert!(!torus.is_convex());
+    /// # Ok::<(), stereology_shape::MeshError>(())
+    /// ```
+    #[must_use]
+    pub fn from_mesh(mesh: ClosedMesh) -> Self {
+        let largest_section_area = largest_section_area(&mesh);
+        Self {
+            form: Form::Mesh(Arc::new(mesh)),
+            largest_section_area,
+        }
+    }
+
+    /// Reads a body from its description: `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`,
+    /// `rock:SEED`, or the name of a mesh file (feature `io`).
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError`]: what is wrong with the words, the numbers, the file or its mesh, and where.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// assert_eq!(Body::parse("rock:3")?, Body::rock(3));
+    /// assert!(Body::parse("box:1,2").is_err());
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn parse(spec: &str) -> Result<Self, BodyError> {
+        let (name, rest) = spec.split_once(':').unwrap_or((spec, ""));
+        match name {
+            "sphere" if rest.is_empty() => Self::sphere(1.0),
+            "sphere" => Err(BodyError::Numbers {
+                spec: spec.to_owned(),
+                expected: "sphere (its diameter is 1)",
+            }),
+            "ellipsoid" => Self::ellipsoid(numbers(spec, rest, "ellipsoid:A,B,C (semi-axes)")?),
+            "box" => Self::cuboid(numbers(spec, rest, "box:A,B,C (full edges)")?),
+            "cylinder" => {
+                let [diameter, length] = numbers(spec, rest, "cylinder:D,L (diameter, length)")?;
+                Self::cylinder(diameter, length)
+            }
+            "rock" => {
+                let seed = rest.trim().parse();
+                let wrong = |_| BodyError::Numbers {
+                    spec: spec.to_owned(),
+                    expected: "rock:SEED, a whole number",
+                };
+                Ok(Self::rock(seed.map_err(wrong)?))
+            }
+            _ => Self::from_file(spec),
+        }
+    }
+
+    fn from_file(spec: &str) -> Result<Self, BodyError> {
+        Err(BodyError::UnknownShape { spec: spec.to_owned() })
+    }
+
+    /// What describes the body.
+    #[must_use]
+    pub fn kind(&self) -> BodyKind<'_> {
+        match &self.form {
+            Form::Sphere { diameter } => BodyKind::Sphere { diameter: *diameter },
+            Form::Ellipsoid { axes } => BodyKind::Ellipsoid {
+                semi_axes: (*axes).into(),
+            },
+            Form::Mesh(mesh) => BodyKind::Mesh(mesh),
+        }
+    }
+
+    /// The mesh of a body that is one.
+    #[must_use]
+    pub fn mesh(&self) -> Option<&ClosedMesh> {
+        match &self.form {
+            Form::Mesh(mesh) => Some(mesh),
+            _ => None,
+        }
+    }
+
+    /// Triangles for drawing or writing: the mesh itself, or an icosphere of `20 · 4^subdivisions` triangles stretched to the closed form.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// assert_eq!(Body::sphere(1.0)?.to_triangles(2).triangles.len(), 320);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    #[must_use]
+    pub fn to_triangles(&self, subdivisions: u32) -> TriangleMesh {
+        match &self.form {
+            Form::Sphere { diameter } => TriangleMesh::icosphere(*diameter, subdivisions),
+            Form::Ellipsoid { axes } => {
+                TriangleMesh::icosphere(2.0, subdivisions).mapped(|p| Point3::from(p.coords.component_mul(axes)))
+            }
+            Form::Mesh(mesh) => mesh.as_triangle_mesh().clone(),
+        }
+    }
+
+    /// Volume; unit of length cubed.
+    #[must_use]
+    pub fn volume(&self) -> f64 {
+        match &self.form {
+            Form::Sphere { diameter } => PI / 6.0 * diameter.powi(3),
+            Form::Ellipsoid { axes } => 4.0 / 3.0 * PI * axes.product(),
+            Form::Mesh(mesh) => mesh.volume(),
+        }
+    }
+
+    /// Area of the surface. Ellipsoids: 4π R_G(a²b², a²c², b²c²), Carlson's elliptic integral.
+    #[must_use]
+    pub fn surface_area(&self) -> f64 {
+        match &self.form {
+            Form::Sphere { diameter } => PI * diameter * diameter,
+            Form::Ellipsoid { axes } => {
+                // In units of the largest axis: fourth powers stay in range.
+                let unit = axes.max();
+                let [a, b, c]: [f64; 3] = (axes / unit).component_mul(&(axes / unit)).into();
+                4.0 * PI * unit * unit * carlson_rg(a * b, a * c, b * c)
+            }
+            Form::Mesh(mesh) => mesh.surface_area(),
+        }
+    }
+
+    /// Mean width (mean caliper diameter) of the hull: hits by random planes per unit of plane distance. Ellipsoids: 2 R_G(a², b², c²).
+    #[must_use]
+    pub fn mean_width(&self) -> f64 {
+        match &self.form {
+            Form::Sphere { diameter } => *diameter,
+            Form::Ellipsoid { axes } => {
+                let unit = axes.max();
+                let [a, b, c]: [f64; 3] = (axes / unit).component_mul(&(axes / unit)).into();
+                2.0 * unit * carlson_rg(a, b, c)
+            }
+            Form::Mesh(mesh) => mesh.mean_width(),
+        }
+    }
+
+    /// Profiles less holes of random sections per unit of plane distance; equal to the mean width of a convex body.
+    #[must_use]
+    pub fn signed_mean_width(&self) -> f64 {
+        self.mesh()
+            .map_or_else(|| self.mean_width(), ClosedMesh::signed_mean_width)
+    }
+
+    /// Centre of volume.
+    #[must_use]
+    pub fn centroid(&self) -> Point3<f64> {
+        self.mesh().map_or_else(Point3::origin, ClosedMesh::centroid)
+    }
+
+    /// Whether the body is convex; then a section is one profile without holes.
+    #[must_use]
+    pub fn is_convex(&self) -> bool {
+        self.mesh().is_none_or(ClosedMesh::is_convex)
+    }
+
+    /// Area of the largest single profile any plane cuts: exact for sphere and ellipsoid, of meshes found by maximisation over
+    /// directions and depths (deterministic; never larger than a section that exists).
+    #[must_use]
+    pub fn largest_section_area(&self) -> f64 {
+        self.largest_section_area
+    }
+
+    /// Diameter of the circle with the area of the largest profile, √(4 A / π): what `size` means everywhere.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        match &self.form {
+            Form::Sphere { diameter } => *diameter,
+            _ => (4.0 / PI * self.largest_section_area).sqrt(),
+        }
+    }
+
+    /// Areas of the disjoint profiles of the section by the plane n·x = `offset`, holes subtracted; empty where the plane misses.
+    ///
+    /// ```
+    /// # use nalgebra::Vector3;
+    /// # use stereology_shape::Body;
+    /// let areas = Body::ellipsoid([1.0, 2.0, 3.0])?.profile_areas(&Vector3::z_axis(), 0.0);
+    /// assert!((areas[0] - 2.0 * std::f64::consts::PI).abs() < 1e-12);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    #[must_use]
+    pub fn profile_areas(&self, normal: &UnitVector3<f64>, offset: f64) -> Vec<f64> {
+        match &self.form {
+            Form::Sphere { diameter } => positive(PI * (0.5 * diameter - offset) * (0.5 * diameter + offset)),
+            Form::Ellipsoid { axes } => positive(elliptic::section_area(axes, normal, offset)),
+            Form::Mesh(mesh) => mesh_profile_areas(mesh, normal, offset),
+        }
+    }
+}
+
+pub(crate) fn mesh_profile_areas(mesh: &ClosedMesh, normal: &UnitVector3<f64>, offset: f64) -> Vec<f64> {
+    let mut slicer = Slicer::new(mesh);
+    slicer.turn_to(normal);
+    if mesh.is_convex() {
+        return positive(slicer.total_area(offset));
+    }
+    slicer
+        .profiles(offset, 0..mesh.triangles().len())
+        .iter()
+        .map(crate::section::FlatProfile::area)
+        .collect()
+}
+
+fn positive(area: f64) -> Vec<f64> {
+    if area > 0.0 { vec![area] } else { Vec::new() }
+}
+
+fn check_length(what: &'static str, value: f64) -> Result<(), BodyError> {
+    if (1e-60..=1e60).contains(&value) {
+        Ok(())
+    } else {
+        Err(BodyError::Length { what, value })
+    }
+}
+
+fn numbers<const N: usize>(spec: &str, list: &str, expected: &'static str) -> Result<[f64; N], BodyError> {
+    let values: Option<Vec<f64>> = list.split(',').map(|word| word.trim().parse().ok()).collect();
+    let wrong = || BodyError::Numbers {
+        spec: spec.to_owned(),
+        expected,
+    };
+    values.ok_or_else(wrong)?.try_into().map_err(|_| wrong())
+}

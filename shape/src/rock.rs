@@ -1,0 +1,57 @@
+//! Random rocks: angular convex chips such as crushed stone, one for every seed.
+
+use nalgebra::{Point3, Vector3};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, UnitSphere};
+
+use crate::closed_mesh::ClosedMesh;
+use crate::hull::convex_hull;
+
+/// A convex rock of 16 to 40 triangular faces, about one unit across; the same mesh for the same seed.
+///
+/// Hull of 11 to 21 points spread over an ellipsoid of random proportions (1 : 0.65–0.95 : 0.45–0.85) and pulled in at random, so faces
+/// differ in size as those of crushed stone do.
+pub(crate) fn rock(seed: u64) -> ClosedMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Points pulled inside the hull of the others may leave too few faces: draw again.
+    loop {
+        match convex_hull(&chip(&mut rng)) {
+            Ok(hull) if hull.triangles().len() >= 16 => return hull,
+            _ => {}
+        }
+    }
+}
+
+/// Points on an ellipsoid, each pulled in by up to 0.22 of its distance.
+fn chip(rng: &mut impl Rng) -> Vec<Point3<f64>> {
+    let axes = Vector3::new(
+        0.5,
+        0.5 * rng.random_range(0.65..0.95),
+        0.5 * rng.random_range(0.45..0.85),
+    );
+    let mut directions: Vec<Vector3<f64>> = Vec::new();
+    for _ in 0..rng.random_range(11..=21_u32) {
+        directions.push(far_direction(rng, &directions));
+    }
+    directions
+        .iter()
+        .map(|d| Point3::from(axes.component_mul(d) * (1.0 - 0.22 * rng.random::<f64>())))
+        .collect()
+}
+
+/// Of three random directions the one farthest from those taken: spread, but not evenly.
+fn far_direction(rng: &mut impl Rng, taken: &[Vector3<f64>]) -> Vector3<f64> {
+    let mut best = (f64::NEG_INFINITY, Vector3::z());
+    for _ in 0..3 {
+        let direction = Vector3::from(UnitSphere.sample(rng));
+        let gap = taken
+            .iter()
+            .map(|other| (direction - other).norm_squared())
+            .fold(4.0, f64::min);
+        if gap > best.0 {
+            best = (gap, direction);
+        }
+    }
+    best.1
+}

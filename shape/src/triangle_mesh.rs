@@ -1,0 +1,146 @@
+//! Any triangles at all: what a file holds and what a picture needs, with no promise about the solid they may enclose.
+
+use nalgebra::Point3;
+
+/// Vertices and triangles as a file holds them: open, inverted or broken meshes too.
+///
+/// [`ClosedMesh`](crate::ClosedMesh) is the checked kind that encloses a solid.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_shape::{ClosedMesh, TriangleMesh};
+///
+/// let ball = TriangleMesh::icosphere(2.0, 5);
+/// let volume = ClosedMesh::try_from(ball)?.volume();
+/// assert!((volume / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3);
+/// # Ok::<(), stereology_shape::MeshError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Positions, in the mesh's own unit of length.
+    pub vertices: Vec<Point3<f64>>,
+    /// Three indices into `vertices`, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// Lowest and highest corner of the box parallel to the axes that holds all vertices; `None` without vertices.
+    ///
+    /// ```
+    /// # use stereology_shape::TriangleMesh;
+    /// let (low, high) = TriangleMesh::cuboid([2.0, 4.0, 6.0]).bounding_box().unwrap();
+    /// assert_eq!((low.x, high.z), (-1.0, 3.0));
+    /// ```
+    #[must_use]
+    pub fn bounding_box(&self) -> Option<(Point3<f64>, Point3<f64>)> {
+        let first = *self.vertices.first()?;
+        Some(
+            self.vertices
+                .iter()
+                .fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))),
+        )
+    }
+
+    /// The mesh with every vertex moved by `place`; a mirroring map turns the mesh inside out.
+    ///
+    /// ```
+    /// # use stereology_shape::TriangleMesh;
+    /// let cube = TriangleMesh::cuboid([1.0; 3]).mapped(|p| 2.0 * p);
+    /// assert_eq!(cube.bounding_box().unwrap().1.x, 1.0);
+    /// ```
+    #[must_use]
+    pub fn mapped(&self, place: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
+        Self {
+            vertices: self.vertices.iter().map(place).collect(),
+            triangles: self.triangles.clone(),
+        }
+    }
+
+    /// Both meshes in one list; nothing is welded or joined.
+    ///
+    /// ```
+    /// # use stereology_shape::TriangleMesh;
+    /// let cube = TriangleMesh::cuboid([1.0; 3]);
+    /// assert_eq!(cube.clone().with(&cube).triangles.len(), 24);
+    /// ```
+    #[must_use]
+    pub fn with(mut self, other: &Self) -> Self {
+        let shift = index(self.vertices.len());
+        self.vertices.extend_from_slice(&other.vertices);
+        self.triangles
+            .extend(other.triangles.iter().map(|t| t.map(|i| i.saturating_add(shift))));
+        self
+    }
+
+    /// Gives vertices at exactly equal positions one index (0 and -0 are equal); returns how many vertices went.
+    ///
+    /// The kept vertices keep their order. Cost: V log V.
+    ///
+    /// ```
+    /// # use stereology_shape::TriangleMesh;
+    /// let cube = TriangleMesh::cuboid([1.0; 3]);
+    /// let mut twice = cube.clone().with(&cube);
+    /// assert_eq!(twice.weld(), 8);
+    /// assert_eq!(twice.vertices, cube.vertices);
+    /// ```
+    pub fn weld(&mut self) -> usize {
+        let key = |i: u32| self.vertices[i as usize].coords.map(|x| x + 0.0).into();
+        let mut order: Vec<u32> = (0..index(self.vertices.len())).collect();
+        order.sort_unstable_by(|&a, &b| {
+            let (pa, pb): ([f64; 3], [f64; 3]) = (key(a), key(b));
+            let compare = |k: usize| pa[k].total_cmp(&pb[k]);
+            compare(0).then(compare(1)).then(compare(2)).then(a.cmp(&b))
+        });
+        // `first[i]`: the lowest index of a vertex at the place of vertex i.
+        let mut first: Vec<u32> = (0..index(self.vertices.len())).collect();
+        for pair in order.windows(2) {
+            if self.vertices[pair[0] as usize] == self.vertices[pair[1] as usize] {
+                first[pair[1] as usize] = first[pair[0] as usize];
+            }
+        }
+        self.keep_vertices(&first)
+    }
+
+    /// Drops vertices that no triangle uses; returns how many.
+    pub(crate) fn drop_unused_vertices(&mut self) -> usize {
+        let mut target = vec![u32::MAX; self.vertices.len()];
+        for &i in self.triangles.iter().flatten() {
+            target[i as usize] = i;
+        }
+        self.keep_vertices(&target)
+    }
+
+    /// Keeps the vertices i with `target[i] == i`; triangles follow `target` to a kept vertex.
+    fn keep_vertices(&mut self, target: &[u32]) -> usize {
+        let before = self.vertices.len();
+        let mut renumbered = vec![u32::MAX; before];
+        let mut kept = Vec::with_capacity(before);
+        for (i, vertex) in self.vertices.iter().enumerate() {
+            if target[i] as usize == i {
+                renumbered[i] = index(kept.len());
+                kept.push(*vertex);
+            }
+        }
+        for corner in self.triangles.iter_mut().flatten() {
+            // Indices out of range stay so: the checks that follow name them.
+            if let Some(&to) = target.get(*corner as usize) {
+                *corner = renumbered[to as usize];
+            } else {
+                *corner = u32::MAX;
+            }
+        }
+        self.vertices = kept;
+        before - self.vertices.len()
+    }
+
+    /// The corners of triangle `t`.
+    pub(crate) fn corners(&self, t: usize) -> [Point3<f64>; 3] {
+        self.triangles[t].map(|i| self.vertices[i as usize])
+    }
+}
+
+/// Index of a vertex or triangle in 32 bits; more than fit is refused where meshes are checked.
+pub(crate) fn index(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,14 @@
+//! Laws that bodies, meshes and particles obey, on random and on analytic examples.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "a test that cannot go on fails; some results are exact"
+)]
+
+mod bodies;
+mod meshes;
+mod queries;
+mod random_shapes;
+mod sections;
+mod spheres;

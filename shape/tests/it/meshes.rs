@@ -1,0 +1,241 @@
+//! What is repaired, what is refused and with which place; hulls.
+
+use approx::assert_relative_eq;
+use nalgebra::Point3;
+use proptest::prelude::*;
+use stereology_shape::{ClosedMesh, HullError, MeshError, Repair, TriangleMesh, convex_hull};
+
+use crate::random_shapes::{fat_l, hollow_cube, points, polytopes, torus};
+
+fn cube() -> TriangleMesh {
+    TriangleMesh::cuboid([1.0; 3])
+}
+
+fn closed(mesh: TriangleMesh) -> Result<ClosedMesh, MeshError> {
+    ClosedMesh::try_from(mesh)
+}
+
+#[test]
+fn an_open_mesh_is_refused_with_its_edges() {
+    let mut open = cube();
+    open.triangles.remove(0);
+    let error = closed(open).unwrap_err();
+    assert!(matches!(error, MeshError::OpenEdge { count: 3, .. }), "{error}");
+    assert!(error.to_string().contains("-0.5"), "{error}");
+}
+
+#[test]
+fn three_sheets_at_an_edge_are_refused() {
+    let mut fins = cube();
+    fins.vertices.push(Point3::new(3.0, 3.0, 3.0));
+    // A second solid that shares an edge with the first: four triangles meet there.
+    let second = TriangleMesh {
+        vertices: [[0.5, 0.5, -0.5], [0.5, 0.5, 0.5], [2.0, 1.0, 0.0], [1.0, 2.0, 0.0]]
+            .map(Point3::from)
+            .to_vec(),
+        triangles: vec![[0, 1, 3], [0, 3, 2], [0, 2, 1], [1, 2, 3]],
+    };
+    let error = closed(fins.with(&second)).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            MeshError::NonManifoldEdge {
+                triangles: 4,
+                count: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn numbers_are_checked_with_their_place() {
+    let mut nan = cube();
+    nan.vertices[5].y = f64::NAN;
+    assert_eq!(closed(nan).unwrap_err(), MeshError::NotFinite { vertex: 5 });
+    let mut far = cube();
+    far.triangles[7][1] = 8;
+    assert_eq!(
+        closed(far).unwrap_err(),
+        MeshError::IndexOutOfRange {
+            triangle: 7,
+            index: 8,
+            vertices: 8
+        }
+    );
+    assert_eq!(closed(TriangleMesh::default()).unwrap_err(), MeshError::Empty);
+    let flat = cube().mapped(|p| Point3::new(p.x, p.y, 0.0));
+    assert!(closed(flat).is_err());
+    assert!(matches!(
+        closed(cube().mapped(|p| p * 1e120)).unwrap_err(),
+        MeshError::Extent { .. }
+    ));
+}
+
+#[test]
+fn far_large_and_small_meshes_measure_right() {
+    for scale in [1e-30, 1e-3, 1e30] {
+        let mesh = closed(cube().mapped(|p| p * scale)).unwrap();
+        assert_relative_eq!(mesh.volume() / scale / scale / scale, 1.0, max_relative = 1e-12);
+        assert_relative_eq!(mesh.mean_width() / scale, 1.5, max_relative = 1e-12);
+        assert!(mesh.is_convex());
+    }
+    let mesh = closed(cube().mapped(|p| Point3::new(p.x + 1e9, p.y - 1e9, p.z + 1e9))).unwrap();
+    assert_relative_eq!(mesh.volume(), 1.0, max_relative = 1e-9);
+    assert_relative_eq!(mesh.mean_width(), 1.5, max_relative = 1e-9);
+}
+
+#[test]
+fn an_inverted_mesh_is_turned_and_said() {
+    let mut inverted = cube();
+    inverted.triangles.iter_mut().for_each(|t| t.swap(0, 2));
+    let mesh = closed(inverted).unwrap();
+    assert_eq!(mesh.repairs(), [Repair::TurnedInsideOut { bodies: 1 }]);
+    assert_relative_eq!(mesh.volume(), 1.0, max_relative = 1e-12);
+}
+
+#[test]
+fn a_soup_of_separate_triangles_is_welded() {
+    let cube = cube();
+    let vertices: Vec<_> = cube
+        .triangles
+        .iter()
+        .flatten()
+        .map(|&i| cube.vertices[i as usize])
+        .collect();
+    let triangles = (0..12).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let mesh = closed(TriangleMesh { vertices, triangles }).unwrap();
+    assert_eq!(mesh.vertices().len(), 8);
+    assert_eq!(mesh.repairs(), [Repair::WeldedVertices { count: 28 }]);
+}
+
+#[test]
+fn duplicates_flaps_and_degenerate_triangles_go() {
+    let mut mesh = cube();
+    let [a, b, c] = mesh.triangles[4];
+    mesh.triangles.push([b, c, a]);
+    mesh.triangles.push([a, a, b]);
+    // A flap: the same triangle both ways, hanging in the air.
+    mesh.vertices
+        .extend([[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0], [9.0, 9.0, 9.0]].map(Point3::from));
+    mesh.triangles.extend([[8, 9, 10], [8, 10, 9]]);
+    let mesh = closed(mesh).unwrap();
+    let expected = [
+        Repair::DroppedDegenerate { count: 1 },
+        Repair::DroppedDuplicates { count: 3 },
+        Repair::DroppedUnusedVertices { count: 4 },
+    ];
+    assert_eq!(mesh.repairs(), expected);
+    assert_relative_eq!(mesh.volume(), 1.0, max_relative = 1e-12);
+}
+
+#[test]
+fn a_klein_bottle_has_no_inside() {
+    // A square grid of 6 × 6 cells glued with a twist.
+    let at = |i: u32, j: u32| -> u32 {
+        let (i, j) = if i == 6 { (0, (6 - j % 6) % 6) } else { (i, j % 6) };
+        6 * i + j
+    };
+    let mut triangles = Vec::new();
+    for i in 0..6 {
+        for j in 0..6 {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    let vertices = (0..36_u32)
+        .map(|i| Point3::new(f64::from(i), f64::from(i * i % 7), f64::from(i * i * i % 11)))
+        .collect();
+    assert!(matches!(
+        closed(TriangleMesh { vertices, triangles }).unwrap_err(),
+        MeshError::NotOrientable { .. }
+    ));
+}
+
+#[test]
+fn cavities_are_subtracted_and_bodies_apart_added() {
+    assert_relative_eq!(hollow_cube().volume(), 7.0, max_relative = 1e-12);
+    assert!(hollow_cube().repairs().is_empty());
+    let wrong_cavity = TriangleMesh::cuboid([2.0; 3]).with(&cube());
+    let mesh = closed(wrong_cavity).unwrap();
+    assert_eq!(mesh.repairs(), [Repair::TurnedInsideOut { bodies: 1 }]);
+    assert_relative_eq!(mesh.volume(), 7.0, max_relative = 1e-12);
+    let apart = closed(cube().with(&cube().mapped(|p| Point3::new(p.x + 3.0, p.y, p.z)))).unwrap();
+    assert_relative_eq!(apart.volume(), 2.0, max_relative = 1e-12);
+    assert!(!apart.is_convex());
+}
+
+#[test]
+fn triangles_without_area_do_not_spoil_angles() {
+    // A cube with a vertex in the middle of an edge, used from one side only: a triangle of three corners on a line fills the gap.
+    let mut mesh = cube();
+    let edge = mesh.triangles[0];
+    mesh.vertices.push(nalgebra::center(
+        &mesh.vertices[edge[0] as usize],
+        &mesh.vertices[edge[1] as usize],
+    ));
+    mesh.triangles[0] = [8, edge[1], edge[2]];
+    mesh.triangles.push([edge[0], 8, edge[2]]);
+    mesh.triangles.push([edge[0], edge[1], 8]);
+    let mesh = closed(mesh).unwrap();
+    assert!(mesh.is_convex());
+    assert_relative_eq!(mesh.signed_mean_width(), 1.5, max_relative = 1e-12);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// No point is outside any face of the hull, by more than rounding of this test's own arithmetic.
+    #[test]
+    fn hulls_hold_all_their_points(points in points(4..200)) {
+        let hull = convex_hull(&points).unwrap();
+        for &[a, b, c] in hull.triangles() {
+            let [a, b, c] = [a, b, c].map(|i| hull.vertices()[i as usize]);
+            let normal = (b - a).cross(&(c - a));
+            for p in &points {
+                prop_assert!(normal.dot(&(p - a)) <= 1e-14);
+            }
+        }
+        prop_assert_eq!(hull.triangles().len(), 2 * hull.vertices().len() - 4);
+        prop_assert!(hull.is_convex());
+    }
+
+    /// Points on a grid: many in one plane, on one line or at one place.
+    #[test]
+    fn hulls_of_grid_points_are_sound(cells in prop::collection::vec([0..3_u8, 0..3_u8, 0..3_u8], 4..60)) {
+        let points: Vec<Point3<f64>> = cells.iter().map(|c| Point3::from(c.map(f64::from))).collect();
+        match convex_hull(&points) {
+            Ok(hull) => {
+                for &[a, b, c] in hull.triangles() {
+                    let [a, b, c] = [a, b, c].map(|i| hull.vertices()[i as usize]);
+                    let normal = (b - a).cross(&(c - a));
+                    prop_assert!(points.iter().all(|p| normal.dot(&(p - a)) <= 0.0), "exact in small integers");
+                }
+            }
+            Err(error) => prop_assert_eq!(error, HullError::Flat),
+        }
+    }
+
+    #[test]
+    fn a_hull_checked_as_any_mesh_is_the_same(mesh in polytopes()) {
+        let again = closed(mesh.as_triangle_mesh().clone()).unwrap();
+        prop_assert!(again.is_convex() && again.repairs().is_empty());
+        assert_relative_eq!(again.mean_width(), mesh.mean_width(), max_relative = 1e-12);
+        assert_relative_eq!(again.signed_mean_width(), mesh.mean_width(), max_relative = 1e-9);
+    }
+
+    #[test]
+    fn any_triangles_give_a_mesh_or_an_error(
+        points in points(1..8),
+        triangles in prop::collection::vec([0..9_u32, 0..9_u32, 0..9_u32], 0..20),
+    ) {
+        let _ = closed(TriangleMesh { vertices: points, triangles });
+    }
+}
+
+#[test]
+fn non_convex_bodies_are_known() {
+    assert!(!fat_l().is_convex() && !torus().is_convex() && !hollow_cube().is_convex());
+    assert_relative_eq!(fat_l().volume(), 3.0, max_relative = 1e-12);
+}

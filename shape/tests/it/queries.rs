@@ -1,0 +1,131 @@
+//! Inside, distance and support of unit bodies against brute force and closed forms.
+
+use approx::assert_relative_eq;
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
+use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+
+use crate::random_shapes::{directions, fat_l, hollow_cube, points, polytopes, torus};
+
+fn unit(mesh: ClosedMesh) -> UnitBody {
+    UnitBody::new(&Body::from_mesh(mesh))
+}
+
+/// The solid angle of the mesh seen from `p` over 4π: 1 inside, 0 outside (van Oosterom & Strackee 1983).
+fn winding(mesh: &ClosedMesh, p: &Point3<f64>) -> f64 {
+    let angles = mesh.triangles().iter().map(|t| {
+        let [a, b, c] = t.map(|i| mesh.vertices()[i as usize] - p);
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+        2.0 * a.dot(&b.cross(&c)).atan2(below)
+    });
+    angles.sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn inside_agrees_with_the_solid_angle(mesh in polytopes(), points in points(40..41)) {
+        for body in [unit(mesh), unit(fat_l()), unit(torus()), unit(hollow_cube())] {
+            let mesh = body.mesh().unwrap();
+            for p in &points {
+                let inside = body.contains(p);
+                prop_assert_eq!(inside, winding(mesh, p) > 0.5);
+                prop_assert_eq!(inside, body.signed_distance(p) < 0.0);
+                if inside {
+                    prop_assert!(p.coords.norm() <= body.bounding_radius());
+                } else {
+                    prop_assert!(p.coords.norm() >= body.inscribed_radius());
+                }
+            }
+        }
+    }
+
+    /// Moving straight away from the nearest point by h changes the distance by h: the distance has slope 1, its gradient is unit.
+    #[test]
+    fn distances_have_slope_one(axes in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64], p in [-1.0..1.0, -1.0..1.0, -1.0..1.0_f64]) {
+        let body = UnitBody::new(&Body::ellipsoid(axes).unwrap());
+        let p = Point3::from(p);
+        let distance = body.signed_distance(&p);
+        prop_assert_eq!(distance < 0.0, body.contains(&p));
+        if distance > 0.0 {
+            let h = 1e-5;
+            let slope = |d: Vector3<f64>| (body.signed_distance(&(p + d * h)) - body.signed_distance(&(p - d * h))) / (2.0 * h);
+            let gradient = Vector3::new(slope(Vector3::x()), slope(Vector3::y()), slope(Vector3::z()));
+            assert_relative_eq!(gradient.norm(), 1.0, epsilon = 1e-6);
+            let foot = p - gradient * distance;
+            prop_assert!(body.signed_distance(&foot).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn supports_touch_the_farthest_vertex(mesh in polytopes(), direction in directions()) {
+        let sphere = ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3)).unwrap();
+        for body in [unit(mesh), unit(torus()), unit(sphere)] {
+            let farthest = body.mesh().unwrap().vertices().iter().map(|v| v.coords.dot(&direction)).fold(f64::MIN, f64::max);
+            assert_relative_eq!(body.support(&direction).coords.dot(&direction), farthest, max_relative = 1e-14);
+        }
+        let body = UnitBody::new(&Body::ellipsoid([1.0, 2.0, 3.0]).unwrap());
+        let touching = body.support(&direction);
+        prop_assert!(body.signed_distance(&touching).abs() < 1e-9);
+    }
+
+    #[test]
+    fn many_faces_answer_as_few_do(points in points(60..61)) {
+        let fine = UnitBody::new(&Body::from_mesh(ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 4)).unwrap()));
+        for p in points {
+            let distance = p.coords.norm() - 0.5;
+            prop_assert!((fine.signed_distance(&p) - distance).abs() < 3e-3);
+            if distance.abs() > 3e-3 {
+                prop_assert_eq!(fine.contains(&p), distance < 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn ellipsoid_distance_is_right_on_the_axes_and_in_the_middle() {
+    let axes = [1.0, 2.0, 4.0];
+    let body = Body::ellipsoid(axes).unwrap();
+    let unit = UnitBody::new(&body);
+    let size = body.size();
+    let at = |x: f64, y: f64, z: f64| unit.signed_distance(&Point3::new(x / size, y / size, z / size)) * size;
+    assert_relative_eq!(at(0.0, 0.0, 0.0), -1.0, max_relative = 1e-12);
+    assert_relative_eq!(at(3.0, 0.0, 0.0), 2.0, max_relative = 1e-12);
+    assert_relative_eq!(at(0.0, 0.0, 6.0), 2.0, max_relative = 1e-12);
+    assert_relative_eq!(at(0.5, 0.0, 0.0), -0.5, max_relative = 1e-12);
+    // Inside on the longest axis, nearer than the radius of curvature a²/c from its end: the end itself; else a circle of points.
+    assert_relative_eq!(at(0.0, 0.0, 3.9), -0.1, max_relative = 1e-9);
+    let (z, a, c) = (2.0_f64, 1.0_f64, 4.0_f64);
+    let gap = c * c - a * a;
+    let expected = a * (1.0 - z * z / gap).sqrt();
+    assert_relative_eq!(at(0.0, 0.0, z), -expected, max_relative = 1e-9);
+    assert_relative_eq!(at(1e-12, 0.0, z), -expected, max_relative = 1e-9);
+    assert_relative_eq!(at(0.0, 1e-9, z), -expected, max_relative = 1e-6);
+}
+
+#[test]
+fn a_box_has_true_distances_outside_its_corners() {
+    let body = UnitBody::new(&Body::cuboid([2.0; 3]).unwrap());
+    let half = body.support(&Vector3::new(1.0, 1.0, 1.0)).x;
+    assert_relative_eq!(
+        body.signed_distance(&Point3::new(half + 1.0, half + 2.0, half + 2.0)),
+        3.0,
+        max_relative = 1e-12
+    );
+    assert_relative_eq!(
+        body.signed_distance(&Point3::new(half - 0.1, 0.0, 0.0)),
+        -0.1,
+        max_relative = 1e-12
+    );
+    assert_relative_eq!(body.inscribed_radius(), half, max_relative = 1e-12);
+    assert_relative_eq!(body.bounding_radius(), half * 3.0_f64.sqrt(), max_relative = 1e-12);
+}
+
+#[test]
+fn the_centroid_of_a_torus_is_outside() {
+    let body = unit(torus());
+    assert!(!body.contains(&Point3::origin()));
+    assert_eq!(body.inscribed_radius(), 0.0);
+}

@@ -1,0 +1,121 @@
+//! Non-negative least squares by active sets (Lawson & Hanson 1974).
+
+use nalgebra::{DMatrix, DVector};
+
+/// A minimiser of ‖A x − b‖ over x ≥ 0, and how many times the set of positive entries grew.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Minimiser {
+    pub(crate) solution: DVector<f64>,
+    pub(crate) iterations: usize,
+    pub(crate) converged: bool,
+}
+
+/// Minimises ‖A x − b‖ over x ≥ 0.
+///
+/// The columns are scaled to length 1 inside, so that the order of magnitude of a bin plays no part. At the end the gradient
+/// w = Aᵀ (b − A x) is zero where x > 0 and not positive where x = 0, to rounding: the Kuhn-Tucker conditions, which are enough for a minimum.
+pub(crate) fn minimise(a: &DMatrix<f64>, b: &DVector<f64>) -> Minimiser {
+    let unknowns = a.ncols();
+    let lengths: Vec<f64> = a.column_iter().map(|column| column.norm()).collect();
+    let scaled = DMatrix::from_fn(a.nrows(), unknowns, |i, j| {
+        if lengths[j] > 0.0 { a[(i, j)] / lengths[j] } else { 0.0 }
+    });
+    let tolerance = 1e-13 * b.norm() * a.nrows().max(unknowns) as f64;
+    let mut x = DVector::zeros(unknowns);
+    let mut free = vec![false; unknowns];
+    let mut iterations = 0;
+    let mut barred = None;
+    while iterations < 10 * unknowns.max(3) {
+        let gradient = scaled.tr_mul(&(b - &scaled * &x));
+        let Some(enter) = (0..unknowns)
+            .filter(|&j| !free[j] && lengths[j] > 0.0 && Some(j) != barred && gradient[j] > tolerance)
+            .max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]).then(j.cmp(&i)))
+        else {
+            let solution = DVector::from_fn(unknowns, |j, _| if free[j] { x[j] / lengths[j] } else { 0.0 });
+            return Minimiser {
+                solution,
+                iterations,
+                converged: true,
+            };
+        };
+        iterations += 1;
+        free[enter] = true;
+        barred = None;
+        loop {
+            let trial = least_squares(&scaled, b, &free);
+            let leaving = |j: &usize| free[*j] && trial[*j] <= 0.0;
+            // Rounding can make a column with a positive gradient enter and leave at once: bar it for a round.
+            if leaving(&enter) && x[enter] <= 0.0 {
+                free[enter] = false;
+                barred = Some(enter);
+                break;
+            }
+            let step = (0..unknowns)
+                .filter(leaving)
+                .map(|j| x[j] / (x[j] - trial[j]))
+                .fold(1.0, f64::min);
+            x += (trial - &x) * step;
+            if step >= 1.0 {
+                break;
+            }
+            for j in 0..unknowns {
+                if free[j] && x[j] <= 1e-15 * x.amax() {
+                    free[j] = false;
+                    x[j] = 0.0;
+                }
+            }
+        }
+    }
+    let solution = DVector::from_fn(unknowns, |j, _| if free[j] { x[j] / lengths[j] } else { 0.0 });
+    Minimiser {
+        solution,
+        iterations,
+        converged: false,
+    }
+}
+
+/// Least squares over the free columns; zero elsewhere.
+fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, free: &[bool]) -> DVector<f64> {
+    let columns: Vec<usize> = (0..a.ncols()).filter(|&j| free[j]).collect();
+    let mut solution = DVector::zeros(a.ncols());
+    let svd = a.select_columns(&columns).svd(true, true);
+    if let Ok(part) = svd.solve(b, 1e-14) {
+        for (k, &j) in columns.iter().enumerate() {
+            solution[j] = part[k];
+        }
+    }
+    solution
+}
+
+#[cfg(test)]
+mod tests {
+    use super::minimise;
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    fn system() -> impl Strategy<Value = (DMatrix<f64>, DVector<f64>)> {
+        (1_usize..12, 1_usize..8).prop_flat_map(|(rows, columns)| {
+            let entries = prop::collection::vec(0.0..1.0_f64, rows * columns);
+            let right = prop::collection::vec(-1.0..1.0_f64, rows);
+            (entries, right)
+                .prop_map(move |(entries, right)| (DMatrix::from_vec(rows, columns, entries), DVector::from_vec(right)))
+        })
+    }
+
+    proptest! {
+        /// Kuhn-Tucker: nothing negative, no descent into the positive, no slope where positive.
+        #[test]
+        fn solution_satisfies_kuhn_tucker((a, b) in system()) {
+            let found = minimise(&a, &b);
+            prop_assert!(found.converged);
+            let gradient = a.tr_mul(&(&b - &a * &found.solution));
+            for j in 0..a.ncols() {
+                prop_assert!(found.solution[j] >= 0.0);
+                prop_assert!(gradient[j] <= 1e-9, "gradient {} at {}", gradient[j], j);
+                if found.solution[j] > 1e-9 {
+                    prop_assert!(gradient[j].abs() <= 1e-9, "gradient {} at positive {}", gradient[j], j);
+                }
+            }
+        }
+    }
+}

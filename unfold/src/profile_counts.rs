@@ -1,0 +1,291 @@
+//! What was seen: profiles counted by size on an examined area.
+
+use crate::size_bins::{EdgesError, check_edges};
+
+/// Profiles counted in bins (a, b] of their size, on a known area.
+///
+/// Bins are closed above: a profile exactly as large as the largest particle belongs to the last bin. The density of profiles is singular
+/// there, so bins closed below would move the result by up to 1.6 %.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_unfold::ProfileCounts;
+///
+/// let counts = ProfileCounts::from_sizes(&[0.2, 0.5, 0.9, 1.0], None, &[0.0, 0.5, 1.0], 8.0)?;
+/// assert_eq!(counts.counts(), [2.0, 2.0]);
+/// assert_eq!(counts.per_area(), [0.25, 0.25]);
+/// # Ok::<(), stereology_unfold::ProfilesError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProfileCounts {
+    edges: Vec<f64>,
+    counts: Vec<f64>,
+    area: f64,
+    profiles: usize,
+    dispersion: f64,
+}
+
+/// Why profiles cannot be counted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProfilesError {
+    /// Nothing to count.
+    #[error(
+        "no profiles: unfolding needs at least one (give the profiles of the examined area, or lower the threshold)"
+    )]
+    None,
+    /// The area is not a positive number.
+    #[error("the examined area is {0}: it must be positive and finite, in the square of the unit of the sizes")]
+    Area(f64),
+    /// A size that is no length.
+    #[error("profile {index} has size {size}: sizes must be positive and finite")]
+    Size {
+        /// Which, from 0.
+        index: usize,
+        /// Its size.
+        size: f64,
+    },
+    /// A weight that is negative or not finite.
+    #[error("profile {index} has weight {weight}: weights must be finite and not negative")]
+    Weight {
+        /// Which, from 0.
+        index: usize,
+        /// Its weight.
+        weight: f64,
+    },
+    /// Weights and sizes differ in number.
+    #[error("{weights} weights for {sizes} sizes: give one weight a profile")]
+    WeightCount {
+        /// Number of weights.
+        weights: usize,
+        /// Number of sizes.
+        sizes: usize,
+    },
+    /// Profiles larger than the last edge: dropping or moving them would shift every bin.
+    #[error(
+        "{count} profiles are larger than the largest size {largest} (the largest is {size}, profile {index}): raise the maximum size"
+    )]
+    TooLarge {
+        /// How many.
+        count: usize,
+        /// The last edge.
+        largest: f64,
+        /// The largest of them.
+        size: f64,
+        /// Which it is, from 0.
+        index: usize,
+    },
+    /// A count that is negative or not finite, or counts and bins that differ in number.
+    #[error("{counts} counts for {bins} bins: give one count a bin, finite and not negative")]
+    Counts {
+        /// Number of counts.
+        counts: usize,
+        /// Number of bins.
+        bins: usize,
+    },
+    /// Edges that make no bins.
+    #[error(transparent)]
+    Edges(#[from] EdgesError),
+}
+
+impl ProfileCounts {
+    /// Counts profile sizes (diameters of the circles of their areas) in the bins between `edges`, on `area`.
+    ///
+    /// `weights`, one a profile, multiply its count: Miles-Lantuejoul weights of edge correction, or 0 outside a counting frame. Profiles not
+    /// larger than the first edge are not counted. Takes `sizes` × log(`edges`) steps.
+    ///
+    /// # Errors
+    ///
+    /// [`ProfilesError`]: no profiles, sizes or weights that are no such thing, sizes beyond the last edge, a bad area or bad edges.
+    pub fn from_sizes(sizes: &[f64], weights: Option<&[f64]>, edges: &[f64], area: f64) -> Result<Self, ProfilesError> {
+        check_edges(edges)?;
+        check_area(area)?;
+        if let Some(weights) = weights
+            && weights.len() != sizes.len()
+        {
+            return Err(ProfilesError::WeightCount {
+                weights: weights.len(),
+                sizes: sizes.len(),
+            });
+        }
+        let weight_of = |index: usize| weights.map_or(1.0, |weights| weights[index]);
+        let largest = edges[edges.len() - 1];
+        let (mut beyond, mut furthest) = (0, (0, largest));
+        for (index, &size) in sizes.iter().enumerate() {
+            if !(size.is_finite() && size > 0.0) {
+                return Err(ProfilesError::Size { index, size });
+            }
+            let weight = weight_of(index);
+            if !(weight.is_finite() && weight >= 0.0) {
+                return Err(ProfilesError::Weight { index, weight });
+            }
+            if size > largest {
+                beyond += 1;
+                if size > furthest.1 {
+                    furthest = (index, size);
+                }
+            }
+        }
+        if beyond > 0 {
+            return Err(ProfilesError::TooLarge {
+                count: beyond,
+                largest,
+                size: furthest.1,
+                index: furthest.0,
+            });
+        }
+        let mut counts = vec![0.0; edges.len() - 1];
+        let (mut profiles, mut squares) = (0, 0.0);
+        for (index, &size) in sizes.iter().enumerate() {
+            let weight = weight_of(index);
+            // The number of edges below the size: bin k holds sizes in (edges[k], edges[k + 1]].
+            let below = edges.partition_point(|&edge| edge < size);
+            if below == 0 || weight == 0.0 {
+                continue;
+            }
+            counts[below - 1] += weight;
+            squares += weight * weight;
+            profiles += 1;
+        }
+        let total: f64 = counts.iter().sum();
+        if profiles == 0 {
+            return Err(ProfilesError::None);
+        }
+        Ok(Self {
+            edges: edges.to_vec(),
+            counts,
+            area,
+            profiles,
+            dispersion: squares / total,
+        })
+    }
+
+    /// Counts that are known by bin, whole numbers or expectations.
+    ///
+    /// # Errors
+    ///
+    /// [`ProfilesError`]: counts that are negative, not finite or not one a bin; all zero; a bad area or bad edges.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A count of profiles is far below 2^53 and not negative.
+    pub fn from_counts(counts: &[f64], edges: &[f64], area: f64) -> Result<Self, ProfilesError> {
+        check_edges(edges)?;
+        check_area(area)?;
+        let bad = counts.iter().any(|count| !(count.is_finite() && *count >= 0.0));
+        if bad || counts.len() + 1 != edges.len() {
+            return Err(ProfilesError::Counts {
+                counts: counts.len(),
+                bins: edges.len() - 1,
+            });
+        }
+        let total: f64 = counts.iter().sum();
+        if total <= 0.0 {
+            return Err(ProfilesError::None);
+        }
+        Ok(Self {
+            edges: edges.to_vec(),
+            counts: counts.to_vec(),
+            area,
+            profiles: total.round() as usize,
+            dispersion: 1.0,
+        })
+    }
+
+    /// The edges, one more than bins.
+    #[must_use]
+    pub fn edges(&self) -> &[f64] {
+        &self.edges
+    }
+
+    /// Sum of weights by bin: without weights, the number of profiles.
+    #[must_use]
+    pub fn counts(&self) -> &[f64] {
+        &self.counts
+    }
+
+    /// Profiles per unit area by bin, N_A.
+    #[must_use]
+    pub fn per_area(&self) -> Vec<f64> {
+        self.counts.iter().map(|count| count / self.area).collect()
+    }
+
+    /// The examined area.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// How many profiles were counted, whatever their weights.
+    #[must_use]
+    pub fn profiles(&self) -> usize {
+        self.profiles
+    }
+
+    /// Variance of a weighted count over its mean, Σ w² / Σ w: 1 without weights.
+    #[must_use]
+    pub fn dispersion(&self) -> f64 {
+        self.dispersion
+    }
+}
+
+fn check_area(area: f64) -> Result<(), ProfilesError> {
+    if area.is_finite() && area > 0.0 {
+        Ok(())
+    } else {
+        Err(ProfilesError::Area(area))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ProfileCounts, ProfilesError};
+
+    const EDGES: [f64; 3] = [0.0, 0.5, 1.0];
+
+    #[test]
+    fn bins_are_closed_above() {
+        let counts = ProfileCounts::from_sizes(&[0.5, 0.500_000_1, 1.0], None, &EDGES, 1.0).unwrap();
+        assert_eq!(counts.counts(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn weights_multiply_counts_and_spread_them() {
+        let counts = ProfileCounts::from_sizes(&[0.1, 0.2, 0.9], Some(&[2.0, 0.0, 1.0]), &EDGES, 1.0).unwrap();
+        assert_eq!(counts.counts(), [2.0, 1.0]);
+        assert_eq!((counts.profiles(), counts.dispersion()), (2, 5.0 / 3.0));
+    }
+
+    #[test]
+    fn bad_profiles_are_told_apart() {
+        let count = |sizes: &[f64], area: f64| ProfileCounts::from_sizes(sizes, None, &EDGES, area).unwrap_err();
+        assert_eq!(count(&[], 1.0), ProfilesError::None);
+        assert!(matches!(
+            count(&[0.1, f64::NAN], 1.0),
+            ProfilesError::Size { index: 1, .. }
+        ));
+        assert_eq!(count(&[0.1, -0.1], 1.0), ProfilesError::Size { index: 1, size: -0.1 });
+        assert_eq!(count(&[0.0], 1.0), ProfilesError::Size { index: 0, size: 0.0 });
+        assert_eq!(
+            count(&[0.1, 1.5, 2.5], 1.0),
+            ProfilesError::TooLarge {
+                count: 2,
+                largest: 1.0,
+                size: 2.5,
+                index: 2
+            }
+        );
+        for area in [0.0, -3.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(count(&[0.1], area), ProfilesError::Area(_)));
+        }
+        assert!(matches!(
+            ProfileCounts::from_sizes(&[0.1], Some(&[-1.0]), &EDGES, 1.0),
+            Err(ProfilesError::Weight { index: 0, .. })
+        ));
+        assert!(ProfileCounts::from_sizes(&[0.1], Some(&[]), &EDGES, 1.0).is_err());
+        assert!(ProfileCounts::from_sizes(&[0.1], None, &[0.0], 1.0).is_err());
+        assert!(ProfileCounts::from_counts(&[1.0], &EDGES, 1.0).is_err());
+        assert_eq!(
+            ProfileCounts::from_counts(&[0.0, 0.0], &EDGES, 1.0),
+            Err(ProfilesError::None)
+        );
+    }
+}

@@ -9,6 +9,7 @@ mod arguments;
 mod commands;
 mod failure;
 mod manual;
+mod numbers;
 mod outputs;
 mod profile_table;
 mod progress;

@@ -1,1 +1,192 @@
-//! `report.html`.
+//! `report.html`: the page from which a person decides whether to trust the solid.
+//!
+//! One file without scripts or links: pictures and plots are inside. It holds nothing that differs between two runs with the same inputs and seed.
+
+mod page;
+mod pictures;
+mod plots;
+mod trust;
+
+pub use page::page;
+pub use trust::{Check, Grade, Verdict, verdict};
+
+use image::RgbImage;
+
+use crate::warnings::Warning;
+
+/// All that the report shows, as plain numbers and pictures.
+#[derive(Clone, Debug)]
+pub struct ReportInput {
+    /// Name of the photograph, without its folder.
+    pub photo_name: String,
+    /// Unit of length, as people read it: `px`, or `units`.
+    pub unit: String,
+    /// The command that makes this result again.
+    pub command: String,
+    /// Every parameter and its value, in the order of the help.
+    pub parameters: Vec<(String, String)>,
+    /// Every warning of every step.
+    pub warnings: Vec<Warning>,
+    /// Photograph and what was found on it.
+    pub photo: PhotoFigures,
+    /// Profiles and particles by size.
+    pub sizes: SizeFigures,
+    /// The packing.
+    pub packing: PackingFigures,
+    /// The solid compared with the photograph.
+    pub comparison: ComparisonFigures,
+}
+
+/// What was found on the photograph.
+#[derive(Clone, Debug)]
+pub struct PhotoFigures {
+    /// The photograph.
+    pub picture: RgbImage,
+    /// The photograph with outlines.
+    pub overlay: RgbImage,
+    /// Profiles that count.
+    pub profiles: u64,
+    /// Profiles found, those left out at the edge included.
+    pub profiles_found: u64,
+    /// Share of the area inside profiles.
+    pub area_fraction: f64,
+    /// Profiles per unit area.
+    pub number_per_area: f64,
+    /// Colour categories: encoded mean colour 0 to 1, number of profiles, mean profile size.
+    pub categories: Vec<CategoryFigures>,
+    /// Mean colour of the binder, encoded, 0 to 1.
+    pub binder: [f64; 3],
+}
+
+/// One colour category.
+#[derive(Clone, Copy, Debug)]
+pub struct CategoryFigures {
+    /// Mean colour, encoded, 0 to 1.
+    pub colour: [f64; 3],
+    /// Number of profiles.
+    pub profiles: u64,
+    /// Mean profile size.
+    pub mean_size: f64,
+}
+
+/// Profiles per area and particles per volume, by size.
+#[derive(Clone, Debug)]
+pub struct SizeFigures {
+    /// Edges of the profile bins.
+    pub profile_edges: Vec<f64>,
+    /// Profiles counted, by bin (weighted).
+    pub observed: Vec<f64>,
+    /// Profiles that the fitted particles would show, by bin.
+    pub refolded: Vec<f64>,
+    /// Edges of the particle size bins.
+    pub particle_edges: Vec<f64>,
+    /// Particles per unit volume, by bin; `None` where nothing can be said.
+    pub number_density: Vec<Option<f64>>,
+    /// Interval of each, if intervals were asked for.
+    pub interval: Option<Vec<(f64, f64)>>,
+    /// Particles per unit volume in the packing, by the same bins.
+    pub packed: Vec<f64>,
+    /// All particles per unit volume.
+    pub total: f64,
+    /// Interval of the total.
+    pub total_interval: Option<(f64, f64)>,
+    /// Mean particle size.
+    pub mean_size: f64,
+    /// Volume fraction that follows from the unfolded densities.
+    pub volume_fraction: f64,
+    /// Shapes and their shares.
+    pub shapes: Vec<(String, f64)>,
+    /// Method and kernel by name.
+    pub method: String,
+    /// Deviance of the refolded counts and its degrees of freedom.
+    pub deviance: f64,
+    /// See `deviance`.
+    pub degrees_of_freedom: f64,
+    /// Condition number of the kernel.
+    pub condition_number: f64,
+    /// Negative densities set to zero.
+    pub clamped_bins: u64,
+}
+
+/// The packing.
+#[derive(Clone, Debug)]
+pub struct PackingFigures {
+    /// Number of particles.
+    pub particles: u64,
+    /// Sides of the box.
+    pub sides: [f64; 3],
+    /// Fraction of the volume inside particles.
+    pub fraction: f64,
+    /// The fraction asked for.
+    pub requested_fraction: f64,
+    /// Largest penetration over the mean size.
+    pub max_overlap: f64,
+    /// Did the separate pass find no overlap?
+    pub certified: bool,
+    /// Rounds of relaxation.
+    pub iterations: u64,
+    /// One period of the solid with three faces seen.
+    pub cube: RgbImage,
+}
+
+/// The solid's sections compared with the photograph.
+#[derive(Clone, Debug)]
+pub struct ComparisonFigures {
+    /// Sections of the solid at the photograph's scale.
+    pub sections: Vec<RgbImage>,
+    /// Sections measured exactly.
+    pub exact: SectionFigures,
+    /// Sections rendered and segmented as the photograph was.
+    pub resegmented: Option<SectionFigures>,
+    /// Profile size histogram of the exact sections over `SizeFigures::profile_edges`, scaled to the photograph's area.
+    pub profiles_synthetic: Vec<f64>,
+    /// Radial power spectrum of the residual: cycles per pixel, photograph, slices of the residual volume.
+    pub spectrum: Option<Spectrum>,
+}
+
+/// How sections of the solid compare with the photograph.
+#[derive(Clone, Copy, Debug)]
+pub struct SectionFigures {
+    /// Profiles measured.
+    pub profiles: u64,
+    /// Wasserstein-1 distance of profile sizes over their mean.
+    pub size_w1: f64,
+    /// Share of the area inside profiles, photograph (as the same measure finds it).
+    pub area_fraction_photo: f64,
+    /// Share of the area inside profiles, sections.
+    pub area_fraction_synthetic: f64,
+    /// Distance of the mean colours, encoded, 0 to 1.
+    pub colour_distance: f64,
+}
+
+/// Radial power spectra of the residual.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    /// Cycles per pixel, up to one half.
+    pub frequency: Vec<f64>,
+    /// Power in the photograph's residual.
+    pub photo: Vec<f64>,
+    /// Power in slices of the residual volume, mean over the three axes.
+    pub slices: Vec<f64>,
+}
+
+impl Spectrum {
+    /// Root mean square of log10 of the ratio: 0.3 is a factor of two.
+    pub fn log_error(&self) -> f64 {
+        let squares: Vec<f64> = self
+            .photo
+            .iter()
+            .zip(&self.slices)
+            .filter(|(photo, slices)| **photo > 0.0 && **slices > 0.0)
+            .map(|(photo, slices)| (slices / photo).log10().powi(2))
+            .collect();
+        if squares.is_empty() {
+            f64::NAN
+        } else {
+            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

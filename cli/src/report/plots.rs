@@ -1,0 +1,238 @@
+//! Plots as SVG text.
+
+use std::ops::Range;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::{SizeFigures, Spectrum};
+use crate::numbers::significant;
+
+const SIZE: (u32, u32) = (520, 320);
+const BARS: RGBColor = RGBColor(168, 187, 206);
+const FIT: RGBColor = RGBColor(196, 78, 32);
+const SOLID: RGBColor = RGBColor(38, 120, 88);
+const INK: RGBColor = RGBColor(60, 60, 60);
+
+type Failed = Box<dyn std::error::Error>;
+
+/// Profiles by size: observed, refolded, and on sections of the solid.
+pub(super) fn profiles(sizes: &SizeFigures, synthetic: &[f64], unit: &str) -> String {
+    let key = [
+        (BARS, "photograph, with its counting error"),
+        (FIT, "refolded fit"),
+        (SOLID, "sections of the solid"),
+    ];
+    drawn(&key, |area| {
+        let edges = &sizes.profile_edges;
+        let top = highest(
+            sizes
+                .observed
+                .iter()
+                .map(|n| n + n.sqrt())
+                .chain(sizes.refolded.iter().copied())
+                .chain(synthetic.iter().copied()),
+        );
+        let mut chart = axes(
+            area,
+            span(edges),
+            0.0..top,
+            &format!("profile size ({unit})"),
+            "profiles",
+        )?;
+        chart.draw_series(bars(edges, &sizes.observed))?;
+        chart.draw_series(whiskers(
+            edges,
+            sizes.observed.iter().map(|n| (n - n.sqrt(), n + n.sqrt())),
+        ))?;
+        chart.draw_series(LineSeries::new(steps(edges, &sizes.refolded), FIT.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new(steps(edges, synthetic), SOLID.stroke_width(2)))?;
+        Ok(())
+    })
+}
+
+/// Particles by size: unfolded with intervals, and packed.
+pub(super) fn particles(sizes: &SizeFigures, unit: &str) -> String {
+    drawn(&[(BARS, "unfolded"), (SOLID, "packed")], |area| {
+        let edges = &sizes.particle_edges;
+        let density: Vec<f64> = sizes.number_density.iter().map(|n| n.unwrap_or(0.0)).collect();
+        let intervals = sizes.interval.clone().unwrap_or_default();
+        // An interval may be far wider than what it is about; the bars must stay visible.
+        let bulk = highest(density.iter().copied().chain(sizes.packed.iter().copied()));
+        let top = highest(intervals.iter().map(|interval| interval.1)).clamp(bulk, 3.0 * bulk);
+        let mut chart = axes(
+            area,
+            span(edges),
+            0.0..top,
+            &format!("particle size ({unit})"),
+            &format!("particles per {unit}\u{b3}"),
+        )?;
+        chart.draw_series(bars(edges, &density))?;
+        chart.draw_series(whiskers(
+            edges,
+            intervals.iter().map(|&(low, high)| (low, high.min(top))),
+        ))?;
+        chart.draw_series(LineSeries::new(steps(edges, &sizes.packed), SOLID.stroke_width(2)))?;
+        let unknown = edges.windows(2).zip(&sizes.number_density).filter(|(_, n)| n.is_none());
+        chart.draw_series(
+            unknown.map(|(bin, _)| Rectangle::new([(bin[0], 0.0), (bin[1], top)], INK.mix(0.08).filled())),
+        )?;
+        Ok(())
+    })
+}
+
+/// Power spectra of the residual.
+pub(super) fn spectra(spectrum: &Spectrum) -> String {
+    drawn(
+        &[(INK, "photograph"), (SOLID, "slices of the residual volume")],
+        |area| {
+            let positive = |values: &[f64]| -> Vec<(f64, f64)> {
+                spectrum
+                    .frequency
+                    .iter()
+                    .copied()
+                    .zip(values.iter().copied())
+                    .filter(|&(f, p)| f > 0.0 && p > 0.0)
+                    .collect()
+            };
+            let (photo, slices) = (positive(&spectrum.photo), positive(&spectrum.slices));
+            let powers = || photo.iter().chain(&slices).map(|point| point.1);
+            let low = powers().fold(f64::INFINITY, f64::min);
+            let high = powers().fold(0.0, f64::max);
+            if !(low.is_finite() && high > 0.0) {
+                return Ok(());
+            }
+            let first = photo
+                .iter()
+                .chain(&slices)
+                .map(|point| point.0)
+                .fold(f64::INFINITY, f64::min);
+            let mut chart = ChartBuilder::on(area)
+                .margin(12)
+                .x_label_area_size(42)
+                .y_label_area_size(64)
+                .build_cartesian_2d((first * 0.9..0.5).log_scale(), (low / 1.5..high * 1.5).log_scale())?;
+            chart
+                .configure_mesh()
+                .light_line_style(TRANSPARENT)
+                .bold_line_style(INK.mix(0.1))
+                .x_desc("cycles per pixel")
+                .y_desc("power")
+                .x_label_formatter(&|x| significant(*x))
+                .y_label_formatter(&|y| format!("{y:.0e}"))
+                .axis_style(INK.mix(0.5))
+                .label_style(("sans-serif", 14, &INK))
+                .draw()?;
+            chart.draw_series(LineSeries::new(photo, INK.stroke_width(2)))?;
+            chart.draw_series(LineSeries::new(slices, SOLID.stroke_width(2)))?;
+            Ok(())
+        },
+    )
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// The key of a plot and its SVG, scaled by the page; a plot that cannot be drawn says so.
+fn drawn(key: &[(RGBColor, &str)], draw: impl FnOnce(&Area<'_>) -> Result<(), Failed>) -> String {
+    let mut svg = String::new();
+    let result = {
+        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        draw(&area).and_then(|()| area.present().map_err(Failed::from))
+    };
+    if let Err(error) = result {
+        return format!("<p>This plot could not be drawn: {error}</p>");
+    }
+    let key: String = key
+        .iter()
+        .map(|(colour, what)| {
+            let RGBColor(r, g, b) = colour;
+            format!("<span><i style=\"background: rgb({r}, {g}, {b})\"></i>{what}</span>")
+        })
+        .collect();
+    let fixed = format!("width=\"{}\" height=\"{}\" ", SIZE.0, SIZE.1);
+    format!(
+        "<div class=\"key\">{key}</div>{}",
+        svg.replacen(&fixed, "role=\"img\" ", 1)
+    )
+}
+
+type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
+type Linear = plotters::coord::types::RangedCoordf64;
+
+fn axes<'a, 'b>(
+    area: &'a Area<'b>,
+    x: Range<f64>,
+    y: Range<f64>,
+    x_name: &str,
+    y_name: &str,
+) -> Result<Chart<'a, 'b, Linear, Linear>, Failed> {
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(64)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(INK.mix(0.1))
+        .x_desc(x_name)
+        .y_desc(y_name)
+        .x_label_formatter(&|x| tick(*x))
+        .y_label_formatter(&|y| tick(*y))
+        .axis_style(INK.mix(0.5))
+        .label_style(("sans-serif", 14, &INK))
+        .draw()?;
+    Ok(chart)
+}
+
+fn tick(value: f64) -> String {
+    if value == 0.0 {
+        "0".to_owned()
+    } else if value.abs() >= 1e5 || value.abs() < 1e-3 {
+        format!("{value:.1e}")
+    } else {
+        let text = format!("{value:.4}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
+}
+
+fn bars(edges: &[f64], heights: &[f64]) -> Vec<Rectangle<(f64, f64)>> {
+    edges
+        .windows(2)
+        .zip(heights)
+        .map(|(bin, &height)| Rectangle::new([(bin[0], 0.0), (bin[1], height)], BARS.filled()))
+        .collect()
+}
+
+/// A vertical line in the middle of each bin.
+fn whiskers(edges: &[f64], intervals: impl Iterator<Item = (f64, f64)>) -> Vec<PathElement<(f64, f64)>> {
+    edges
+        .windows(2)
+        .zip(intervals)
+        .filter(|(_, (low, high))| low.is_finite() && high.is_finite() && high > low)
+        .map(|(bin, (low, high))| {
+            let middle = (bin[0] + bin[1]) / 2.0;
+            PathElement::new(vec![(middle, low.max(0.0)), (middle, high)], INK.stroke_width(1))
+        })
+        .collect()
+}
+
+/// Outline of a histogram.
+fn steps(edges: &[f64], heights: &[f64]) -> Vec<(f64, f64)> {
+    edges
+        .windows(2)
+        .zip(heights)
+        .flat_map(|(bin, &height)| [(bin[0], height), (bin[1], height)])
+        .collect()
+}
+
+fn span(edges: &[f64]) -> Range<f64> {
+    let last = edges.last().copied().filter(|last| *last > 0.0).unwrap_or(1.0);
+    0.0..last
+}
+
+fn highest(values: impl Iterator<Item = f64>) -> f64 {
+    let highest = values.filter(|value| value.is_finite()).fold(0.0, f64::max);
+    if highest > 0.0 { 1.08 * highest } else { 1.0 }
+}

@@ -1,0 +1,247 @@
+//! The fast way: particles pushed apart by their overlaps, with inertia and friction.
+//!
+//! # Formula
+//!
+//! ```text
+//! v ← μ v + Δt F / m,     x ← x + Δt v,      μ = .9 … .98,  Δt = .6 in units in which a contact has stiffness 1 and the lightest particle mass 1
+//! ```
+//!
+//! and the same for rotations: gradient descent with momentum (Polyak 1964). Compared with FIRE (Bitzek et al. 2006), which stops all particles whenever
+//! the whole runs uphill, it needs less than half the iterations for spheres (lognormal σ .3, 10,000 at .64: 185-400 against 581), and does not stall on
+//! flat faces: their energy has creases, on which a few rattling cubes stop everybody for ever (500 cubes at .6: 75 iterations; FIRE did not end in 2,000).
+
+use crate::assembly::{Assembly, Memory, Overlaps};
+use crate::neighbours::Neighbours;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::ops::ControlFlow;
+use stereology_shape::PeriodicBox;
+
+/// How a relaxation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    Apart,
+    Stuck,
+    Cancelled,
+}
+
+/// What a relaxation may do.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Sizes are multiplied by this while relaxing: what is apart at true size is then reached in finite time.
+    pub(crate) swelling: f64,
+    pub(crate) iterations: usize,
+    /// How often particles that no longer yield are shaken.
+    pub(crate) shakes: u64,
+    pub(crate) seed: u64,
+}
+
+/// Pairs count as apart when they are so by a little more than rounding.
+pub(crate) const APART: f64 = -1e-9;
+
+/// Longest step that is stable for a particle of twelve contacts, of stiffness 1 each (measured: .8 diverges for cubes).
+const STEP: f64 = 0.6;
+const SHORTEST_STEP: f64 = 0.15;
+/// Nobody moves further in a step than this part of its radius, or turns by more than this angle.
+const STRIDE: f64 = 0.2;
+/// Progress is judged after so many iterations.
+const WATCH: usize = 100;
+
+/// Relaxes until no pair overlaps at true size. Energies are appended to `trace`.
+pub(crate) fn relax(
+    assembly: &mut Assembly<'_>,
+    period: &PeriodicBox,
+    limits: &Limits,
+    trace: &mut Vec<f64>,
+    progress: &dyn Fn(&Overlaps) -> ControlFlow<()>,
+) -> End {
+    let mut motion = Motion::new(assembly);
+    let mut nearby = Nearby::new(assembly, period, limits.swelling);
+    let mut overlaps = Overlaps::default();
+    let mut shakes = 0;
+    let mut before = f64::INFINITY;
+    let mut swelling = limits.swelling;
+    for iteration in 0..limits.iterations {
+        nearby.follow(assembly, period);
+        assembly.overlaps(&nearby.neighbours, &mut nearby.memory, swelling, &mut overlaps);
+        trace.push(overlaps.energy);
+        if overlaps.worst < APART {
+            return End::Apart;
+        }
+        if progress(&overlaps).is_break() {
+            return End::Cancelled;
+        }
+        if iteration % WATCH == WATCH - 1 {
+            if overlaps.energy > before {
+                motion.step = (0.7 * motion.step).max(SHORTEST_STEP);
+            } else if overlaps.energy > 0.98 * before && motion.age > 10 * WATCH {
+                if shakes == limits.shakes {
+                    return End::Stuck;
+                }
+                shakes += 1;
+                swelling = 1.0 + 0.5 * (swelling - 1.0);
+                shake(assembly, limits.seed, shakes);
+                motion = Motion::new(assembly);
+                before = f64::INFINITY;
+                continue;
+            }
+            before = overlaps.energy;
+        }
+        motion.advance(assembly, &overlaps);
+    }
+    End::Stuck
+}
+
+/// Moves and turns every particle a little at random.
+fn shake(assembly: &mut Assembly<'_>, seed: u64, number: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(number);
+    let mut draw = || Vector3::from_fn(|_, _| 0.3 * (2.0 * rng.random::<f64>() - 1.0));
+    for i in 0..assembly.len() {
+        let way = draw() * assembly.radius[i];
+        assembly.shift(i, &way);
+        if !assembly.round {
+            assembly.turn(i, &draw());
+        }
+    }
+}
+
+/// The list of pairs that may meet, renewed when somebody has moved too far.
+struct Nearby {
+    neighbours: Neighbours,
+    memory: Vec<Memory>,
+    swelling: f64,
+    /// Everybody's place when the list was made.
+    place: Vec<Vector3<f64>>,
+    mean: f64,
+    skin: f64,
+    age: usize,
+}
+
+impl Nearby {
+    fn new(assembly: &mut Assembly<'_>, period: &PeriodicBox, swelling: f64) -> Self {
+        let mean = assembly.radius.iter().sum::<f64>() / assembly.len().max(1) as f64;
+        assembly.wrap(period);
+        let skin = 0.8 * mean;
+        let neighbours = assembly.neighbours(swelling, skin);
+        let memory = vec![Memory::NONE; if assembly.round { 0 } else { neighbours.len() }];
+        Self {
+            neighbours,
+            memory,
+            swelling,
+            place: assembly.centre.clone(),
+            mean,
+            skin,
+            age: 0,
+        }
+    }
+
+    fn follow(&mut self, assembly: &mut Assembly<'_>, period: &PeriodicBox) {
+        self.age += 1;
+        let far = 0.25 * self.skin * self.skin;
+        if assembly
+            .centre
+            .iter()
+            .zip(&self.place)
+            .all(|(now, then)| (now - then).norm_squared() < far)
+        {
+            return;
+        }
+        // A wide skin is dear at every step, a narrow one is soon outrun.
+        self.skin = if self.age < 6 {
+            (1.3 * self.skin).min(2.0 * self.mean)
+        } else {
+            (0.8 * self.skin).max(0.2 * self.mean)
+        };
+        self.age = 0;
+        assembly.wrap(period);
+        self.neighbours = assembly.neighbours(self.swelling, self.skin);
+        self.place.clone_from(&assembly.centre);
+        if !assembly.round {
+            self.memory.clear();
+            self.memory.resize(self.neighbours.len(), Memory::NONE);
+        }
+    }
+}
+
+/// Velocities and forces of all particles.
+struct Motion {
+    velocity: Vec<Vector3<f64>>,
+    force: Vec<Vector3<f64>>,
+    spin: Vec<Vector3<f64>>,
+    torque: Vec<Vector3<f64>>,
+    mass: Vec<f64>,
+    inertia: Vec<f64>,
+    step: f64,
+    age: usize,
+}
+
+impl Motion {
+    fn new(assembly: &Assembly<'_>) -> Self {
+        let count = assembly.len();
+        let turning = if assembly.round { 0 } else { count };
+        let mean = assembly.radius.iter().sum::<f64>() / count.max(1) as f64;
+        // A large particle is held by as many contacts as its surface has room for: mass by surface keeps all frequencies alike.
+        let mass: Vec<f64> = assembly.radius.iter().map(|r| (r / mean).powi(2).max(1.0)).collect();
+        let inertia = (0..turning)
+            .map(|i| 0.5 * mass[i] * assembly.radius[i].powi(2))
+            .collect();
+        Self {
+            velocity: vec![Vector3::zeros(); count],
+            force: vec![Vector3::zeros(); count],
+            spin: vec![Vector3::zeros(); turning],
+            torque: vec![Vector3::zeros(); turning],
+            mass,
+            inertia,
+            step: STEP,
+            age: 0,
+        }
+    }
+
+    /// One step down the energy whose overlaps were just found.
+    fn advance(&mut self, assembly: &mut Assembly<'_>, overlaps: &Overlaps) {
+        self.gather(assembly, overlaps);
+        self.age += 1;
+        // The nearer to jamming, the slower the slowest motions: let momentum build up for them.
+        let keep = match self.age {
+            0..150 => 0.9,
+            150..500 => 0.95,
+            500..1500 => 0.97,
+            _ => 0.98,
+        };
+        for i in 0..self.velocity.len() {
+            let velocity = self.velocity[i] * keep + self.force[i] * (self.step / self.mass[i]);
+            self.velocity[i] = bounded(velocity, STRIDE * assembly.radius[i] / self.step);
+            assembly.shift(i, &(self.velocity[i] * self.step));
+        }
+        for i in 0..self.spin.len() {
+            let spin = self.spin[i] * keep + self.torque[i] * (self.step / self.inertia[i]);
+            self.spin[i] = bounded(spin, STRIDE / self.step);
+            assembly.turn(i, &(self.spin[i] * self.step));
+        }
+    }
+
+    fn gather(&mut self, assembly: &Assembly<'_>, overlaps: &Overlaps) {
+        self.force.fill(Vector3::zeros());
+        self.torque.fill(Vector3::zeros());
+        for push in overlaps.pushes() {
+            let (a, b) = (push.a as usize, push.b as usize);
+            self.force[a] -= push.force;
+            self.force[b] += push.force;
+            if !assembly.round {
+                self.torque[a] -= push.on_a.cross(&push.force);
+                self.torque[b] += push.on_b.cross(&push.force);
+            }
+        }
+    }
+}
+
+fn bounded(vector: Vector3<f64>, most: f64) -> Vector3<f64> {
+    let squared = vector.norm_squared();
+    if squared > most * most {
+        vector * (most / squared.sqrt())
+    } else {
+        vector
+    }
+}

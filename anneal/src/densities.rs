@@ -1,0 +1,130 @@
+//! From unfolded number densities to particles.
+
+use crate::population::{BINS, Grain, MOST, PopulationError};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Number densities of one type of particle: what unfolding gives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeDensities<'a> {
+    /// Index of the body.
+    pub shape: usize,
+    /// Colour category.
+    pub category: u8,
+    /// Bin edges (a, b], one more than bins; lengths.
+    pub edges: &'a [f64],
+    /// Particles per unit volume in each bin. Bins of which nothing is known hold 0.
+    pub number_density: &'a [f64],
+}
+
+/// Where in its bin a particle's size lies: as the kernel assumed that unfolded the densities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SizeInBin {
+    /// Evenly spread over the bin: of `n` particles one is drawn from each n-th part.
+    #[default]
+    Spread,
+    /// At the upper edge, as in the paper.
+    UpperEdge,
+}
+
+/// Whole numbers of particles in a volume that has these number densities: the cumulative numbers from the largest bin down, rounded.
+///
+/// So no bin and no number of particles above a size is off by more than one, and their total by at most a half; rounding each bin alone would lose all the
+/// rare large particles, which hold most of the volume.
+///
+/// # Errors
+///
+/// [`PopulationError::Volume`]; [`PopulationError::TooMany`] above 10⁸; [`PopulationError::Histogram`] for densities that are negative or not numbers.
+///
+/// ```
+/// // Five bins that expect 0.4 particles each hold two together, not none.
+/// let counts = stereology_anneal::counts_from_densities(&[0.4; 5], 1.0)?;
+/// assert_eq!(counts.iter().sum::<usize>(), 2);
+/// # Ok::<(), stereology_anneal::PopulationError>(())
+/// ```
+pub fn counts_from_densities(number_density: &[f64], volume: f64) -> Result<Vec<usize>, PopulationError> {
+    if !(volume.is_finite() && volume > 0.0) {
+        return Err(PopulationError::Volume(volume));
+    }
+    if number_density.iter().any(|n| !(n.is_finite() && *n >= 0.0)) {
+        let densities = number_density.len();
+        return Err(PopulationError::Histogram {
+            histogram: 0,
+            edges: densities + 1,
+            densities,
+        });
+    }
+    let total = number_density.iter().sum::<f64>() * volume;
+    if total > MOST {
+        return Err(PopulationError::TooMany(total));
+    }
+    let mut counts = vec![0; number_density.len()];
+    let (mut expected, mut given) = (0.0, 0);
+    for (bin, density) in number_density.iter().enumerate().rev() {
+        expected += density * volume;
+        counts[bin] = (expected + 0.5).floor() as usize - given;
+        given += counts[bin];
+    }
+    Ok(counts)
+}
+
+/// The particles of a volume that has these number densities, by type, largest last.
+///
+/// Counts are those of [`counts_from_densities`]. To meet a volume fraction exactly let the box follow ([`box_for_fraction`](crate::box_for_fraction): sizes
+/// and histogram stay, densities change by the rounding) or the sizes ([`scale_to_fraction`](crate::scale_to_fraction)).
+///
+/// # Errors
+///
+/// [`PopulationError::Histogram`] unless edges increase and fit the densities; as [`counts_from_densities`].
+///
+/// ```
+/// use stereology_anneal::{SizeDensities, SizeInBin, grains_from_densities};
+///
+/// let densities = SizeDensities { shape: 0, category: 2, edges: &[0.0, 1.0, 2.0], number_density: &[3.0, 1.0] };
+/// let grains = grains_from_densities(&[densities], 10.0, SizeInBin::UpperEdge, 0)?;
+/// assert_eq!(grains.len(), 40);
+/// assert_eq!(grains.iter().filter(|g| g.size == 2.0).count(), 10);
+/// # Ok::<(), stereology_anneal::PopulationError>(())
+/// ```
+pub fn grains_from_densities(
+    densities: &[SizeDensities<'_>],
+    volume: f64,
+    size_in_bin: SizeInBin,
+    seed: u64,
+) -> Result<Vec<Grain>, PopulationError> {
+    let mut grains = Vec::new();
+    for (histogram, of) in densities.iter().enumerate() {
+        let wrong = PopulationError::Histogram {
+            histogram,
+            edges: of.edges.len(),
+            densities: of.number_density.len(),
+        };
+        let increasing = of.edges.windows(2).all(|pair| pair[0] < pair[1] && pair[1].is_finite());
+        if of.edges.len() != of.number_density.len() + 1 || !increasing || of.edges[0] < 0.0 {
+            return Err(wrong);
+        }
+        let counts = counts_from_densities(of.number_density, volume).map_err(|error| match error {
+            PopulationError::Histogram { .. } => wrong,
+            other => other,
+        })?;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream((BINS << 32) + histogram as u64);
+        for (bin, count) in counts.into_iter().enumerate() {
+            let (lower, upper) = (of.edges[bin], of.edges[bin + 1]);
+            for k in 0..count {
+                let size = match size_in_bin {
+                    SizeInBin::UpperEdge => upper,
+                    // In (lower, upper]: a size of zero is none.
+                    SizeInBin::Spread => upper - (upper - lower) * ((k as f64 + rng.random::<f64>()) / count as f64),
+                };
+                grains.push(Grain {
+                    shape: of.shape,
+                    size,
+                    category: of.category,
+                });
+            }
+        }
+    }
+    Ok(grains)
+}

@@ -98,6 +98,10 @@ pub enum BodyError {
         /// What is wrong with its mesh.
         source: MeshError,
     },
+    /// The mesh file cannot be read.
+    #[cfg(feature = "io")]
+    #[error(transparent)]
+    File(#[from] crate::mesh_file::MeshFileError),
 }
 
 /// Sides of the prism that stands for a cylinder.
@@ -257,6 +261,21 @@ impl Body {
         }
     }
 
+    #[cfg(feature = "io")]
+    fn from_file(spec: &str) -> Result<Self, BodyError> {
+        let path = std::path::Path::new(spec);
+        if crate::mesh_file::MeshFormat::from_path(path).is_err() {
+            return Err(BodyError::UnknownShape { spec: spec.to_owned() });
+        }
+        let mesh = crate::mesh_file::read_mesh(path)?;
+        let closed = ClosedMesh::try_from(mesh).map_err(|source| BodyError::MeshOf {
+            path: spec.to_owned(),
+            source,
+        })?;
+        Ok(Self::from_mesh(closed))
+    }
+
+    #[cfg(not(feature = "io"))]
     fn from_file(spec: &str) -> Result<Self, BodyError> {
         Err(BodyError::UnknownShape { spec: spec.to_owned() })
     }

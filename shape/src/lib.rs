@@ -46,12 +46,22 @@ mod hull;
 mod inside;
 mod largest_section;
 mod measures;
+#[cfg(feature = "io")]
+mod mesh_file;
 mod nearest;
+#[cfg(feature = "io")]
+mod obj;
 mod particle;
 mod periodic_box;
+#[cfg(feature = "io")]
+mod ply;
+#[cfg(feature = "io")]
+mod polygon;
 mod primitives;
 mod rock;
 mod section;
+#[cfg(feature = "io")]
+mod stl;
 mod topology;
 mod triangle_mesh;
 mod unit_body;
@@ -60,6 +70,8 @@ mod winding;
 pub use body::{Body, BodyError, BodyKind};
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};
 pub use hull::{HullError, convex_hull};
+#[cfg(feature = "io")]
+pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};
 pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
 pub use section::{SectionPolygon, section_polygons};

@@ -7,6 +7,8 @@
 )]
 
 mod bodies;
+#[cfg(feature = "io")]
+mod files;
 mod meshes;
 mod queries;
 mod random_shapes;

@@ -1,0 +1,270 @@
+//! Mesh files in and out: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::triangle_mesh::TriangleMesh;
+use crate::{obj, ply, stl};
+
+/// The mesh formats that are read and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MeshFormat {
+    /// Wavefront text; only positions and faces are read. Written with all digits.
+    Obj,
+    /// Stereolithography; text or binary is found out on reading. Written as binary, in single precision: that is the format.
+    Stl,
+    /// Polygon file format; text or binary of either byte order is found out on reading. Written as little-endian binary, doubles.
+    Ply,
+}
+
+impl MeshFormat {
+    /// The format that a file name's ending stands for, in any case.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshFileError::Format`] if the name ends in none of .obj, .stl, .ply.
+    ///
+    /// ```
+    /// # use stereology_shape::MeshFormat;
+    /// assert_eq!(MeshFormat::from_path("rock.STL".as_ref())?, MeshFormat::Stl);
+    /// # Ok::<(), stereology_shape::MeshFileError>(())
+    /// ```
+    pub fn from_path(path: &Path) -> Result<Self, MeshFileError> {
+        let ending = path
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("obj") => Ok(Self::Obj),
+            Some("stl") => Ok(Self::Stl),
+            Some("ply") => Ok(Self::Ply),
+            _ => Err(MeshFileError::Format { path: path.to_owned() }),
+        }
+    }
+}
+
+/// Why a mesh file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshFileError {
+    /// The name does not tell a format.
+    #[error("{}: mesh files end in .obj, .stl or .ply", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file cannot be opened or read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is not what its name says, broken or cut short.
+    #[error("{}: {place}: {fault}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        place: MeshFilePlace,
+        /// What is wrong there.
+        fault: MeshFileFault,
+    },
+}
+
+/// A place in a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MeshFilePlace {
+    /// The file as a whole.
+    File,
+    /// A line, counted from 1.
+    Line(usize),
+    /// A vertex, counted from 0 in the order of the file.
+    Vertex(usize),
+    /// A face, counted from 0 in the order of the file.
+    Face(usize),
+}
+
+impl std::fmt::Display for MeshFilePlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File => f.write_str("the file"),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Vertex(vertex) => write!(f, "vertex {vertex} (counted from 0)"),
+            Self::Face(face) => write!(f, "face {face} (counted from 0)"),
+        }
+    }
+}
+
+/// What is wrong at a place of a mesh file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshFileFault {
+    /// A coordinate is no number, not finite, or not there.
+    #[error("{word:?} is not a finite coordinate")]
+    Coordinate {
+        /// What stands there; empty if nothing does.
+        word: String,
+    },
+    /// A face names a vertex that is not in the file.
+    #[error("{word:?} is not the index of one of the {vertices} vertices")]
+    Index {
+        /// What stands there.
+        word: String,
+        /// How many vertices the file has.
+        vertices: usize,
+    },
+    /// A face with fewer than 3 or more than 4096 corners.
+    #[error("a face has 3 to 4096 corners, not {corners}")]
+    Corners {
+        /// How many it has.
+        corners: usize,
+    },
+    /// Something else was to come.
+    #[error("expected {expected}, found {found:?}")]
+    Expected {
+        /// What the format asks for.
+        expected: &'static str,
+        /// What stands there; empty at the end of the file.
+        found: String,
+    },
+    /// The file is shorter or longer than it says.
+    #[error(
+        "{triangles} triangles take {expected} bytes, but the file has {found}: it is cut short or not an STL file"
+    )]
+    Length {
+        /// How many triangles the file says it has.
+        triangles: u32,
+        /// Bytes they take.
+        expected: u64,
+        /// Bytes there are.
+        found: u64,
+    },
+    /// The PLY parser's own finding.
+    #[error("{message}")]
+    Ply {
+        /// In its words.
+        message: String,
+    },
+    /// No faces.
+    #[error("there are no faces")]
+    NoFaces,
+}
+
+/// A fault and its place, before the file's name is known.
+pub(crate) type Fault = (MeshFilePlace, MeshFileFault);
+
+/// Reads the triangles of a mesh file; the ending of its name tells the format. Faces with more corners are cut into triangles.
+///
+/// Vertices come as they are in the file: texture or normal seams of an OBJ do not split them, and [`ClosedMesh`](crate::ClosedMesh)
+/// welds equal positions and says so. An STL file has no shared vertices: equal positions are one vertex from the start.
+///
+/// # Errors
+///
+/// [`MeshFileError`]: the file, the place in it and the fault. A file that is cut short is never read in part.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_shape::{TriangleMesh, read_mesh, write_mesh};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("box.obj");
+/// let mesh = TriangleMesh::cuboid([0.1, 0.2, 0.3]);
+/// write_mesh(&path, &mesh)?;
+/// assert_eq!(read_mesh(&path)?, mesh);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> {
+    let path = path.as_ref();
+    let format = MeshFormat::from_path(path)?;
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mesh = match format {
+        MeshFormat::Obj => obj::parse(&bytes),
+        MeshFormat::Stl => stl::parse(&bytes),
+        MeshFormat::Ply => ply::parse(&bytes),
+    };
+    mesh.map_err(|(place, fault)| MeshFileError::Content {
+        path: path.to_owned(),
+        place,
+        fault,
+    })
+}
+
+/// Writes triangles as a mesh file; the ending of its name tells the format. An existing file is replaced, and only by a whole one: the
+/// new file is written beside as `FILE.partial` and renamed.
+///
+/// OBJ and PLY keep every bit of the positions; STL holds them in single precision.
+///
+/// # Errors
+///
+/// [`MeshFileError::Format`] if the name tells no format, [`MeshFileError::Write`] if the file cannot be written.
+///
+/// ```
+/// # use stereology_shape::{TriangleMesh, read_mesh, write_mesh};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("ball.ply");
+/// write_mesh(&path, &TriangleMesh::icosphere(1.0, 2))?;
+/// assert_eq!(read_mesh(&path)?.triangles.len(), 320);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), MeshFileError> {
+    let path = path.as_ref();
+    let format = MeshFormat::from_path(path)?;
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let write = || {
+        check_indices(mesh)?;
+        let mut out = BufWriter::new(File::create(&partial)?);
+        match format {
+            MeshFormat::Obj => obj::write(&mut out, mesh)?,
+            MeshFormat::Stl => stl::write(&mut out, mesh)?,
+            MeshFormat::Ply => ply::write(&mut out, mesh)?,
+        }
+        out.flush()?;
+        out.into_inner()
+            .map_err(std::io::IntoInnerError::into_error)?
+            .sync_all()?;
+        std::fs::rename(&partial, path)
+    };
+    write().map_err(|source| MeshFileError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn check_indices(mesh: &TriangleMesh) -> std::io::Result<()> {
+    let vertices = mesh.vertices.len();
+    match mesh
+        .triangles
+        .iter()
+        .position(|corners| corners.iter().any(|&i| i as usize >= vertices))
+    {
+        None => Ok(()),
+        Some(t) => {
+            let message = format!("triangle {t} names a vertex that is not among the {vertices} vertices");
+            Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, message))
+        }
+    }
+}
+
+/// A finite number from a word of a text file.
+pub(crate) fn coordinate(word: Option<&str>) -> Result<f64, MeshFileFault> {
+    let word = word.unwrap_or_default();
+    let number = word.parse().ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| MeshFileFault::Coordinate { word: word.to_owned() })
+}

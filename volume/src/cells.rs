@@ -1,0 +1,262 @@
+//! Which particles can be at a point: the periodic box cut into cells, each with the particle images that reach into it.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "cells are fewer than 2^27, particles and their places checked by Solid::new"
+)]
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+use stereology_shape::{Particle, PeriodicBox, UnitBody};
+
+/// Cells made per particle: between a long list in each cell and a long build.
+const CELLS_PER_PARTICLE: f64 = 32.0;
+const MOST_CELLS_PER_SIDE: f64 = 512.0;
+/// Share of a cell by which its bounds are widened, more than the rounding of its coordinates.
+const SLACK: f64 = 1e-9;
+const NONE: u32 = u32::MAX;
+
+/// The particles as placed bodies, and the cells of the box that they reach into.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    sides: Vector3<f64>,
+    counts: [usize; 3],
+    cells_per_length: Vector3<f64>,
+    placed: Vec<Placed>,
+    /// The particle that fills the whole cell and has the lowest index there, or [`NONE`].
+    owners: Vec<u32>,
+    /// `images[starts[cell]..starts[cell + 1]]` reach into the cell, lowest particle first.
+    starts: Vec<u32>,
+    images: Vec<Image>,
+}
+
+/// A particle, its motion inverted.
+#[derive(Clone, Debug)]
+struct Placed {
+    shape: usize,
+    size: f64,
+    /// R⁻¹ / size.
+    to_local: Matrix3<f64>,
+    /// Radii, about the centre, of the balls outside and inside the particle.
+    outer: f64,
+    inner: f64,
+}
+
+/// One of the periodic images of a particle.
+#[derive(Clone, Copy, Debug)]
+struct Image {
+    centre: Point3<f64>,
+    outer_squared: f64,
+    particle: u32,
+}
+
+/// How a cell lies to a particle.
+#[derive(Clone, Copy, PartialEq)]
+enum Cover {
+    Partial,
+    Whole,
+}
+
+impl Cells {
+    /// Shapes, sizes and positions must have been checked: indices in range, numbers finite and positive.
+    pub(crate) fn new(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Self {
+        let sides = period.sides();
+        let wanted = (CELLS_PER_PARTICLE * particles.len().max(1) as f64 / period.volume()).cbrt();
+        let counts = [0, 1, 2].map(|k| (sides[k] * wanted).ceil().clamp(1.0, MOST_CELLS_PER_SIDE) as usize);
+        let cells_per_length = Vector3::from_fn(|k, _| counts[k] as f64 / sides[k]);
+        let placed = particles
+            .iter()
+            .map(|particle| Placed::new(particle, &bodies[particle.shape]))
+            .collect();
+        let total = counts.iter().product::<usize>();
+        let mut cells = Self {
+            sides,
+            counts,
+            cells_per_length,
+            placed,
+            owners: vec![NONE; total],
+            starts: vec![0; total + 1],
+            images: Vec::new(),
+        };
+        let reached: Vec<Vec<(u32, Cover, Image)>> = particles
+            .par_iter()
+            .enumerate()
+            .map(|(index, particle)| cells.reached(index, &bodies[particle.shape], &period.wrap(&particle.position)))
+            .collect();
+        cells.sort_in(&reached);
+        cells
+    }
+
+    /// The cells that the images of a particle reach into.
+    fn reached(&self, index: usize, body: &UnitBody, centre: &Point3<f64>) -> Vec<(u32, Cover, Image)> {
+        let placed = &self.placed[index];
+        let size = self.cells_per_length.map(f64::recip);
+        let half_diagonal = size.norm() * (0.5 + SLACK);
+        let range = |k: usize| {
+            let reach = placed.outer + SLACK * size[k];
+            let cell = |x: f64| (x * self.cells_per_length[k]).floor() as i64;
+            cell(centre[k] - reach)..=cell(centre[k] + reach)
+        };
+        let mut reached = Vec::new();
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0) {
+                    let index_along = [i, j, k];
+                    let middle = Point3::from(Vector3::from_fn(|a, _| (index_along[a] as f64 + 0.5) * size[a]));
+                    let offset = middle - centre;
+                    let distance = offset.norm();
+                    if distance > placed.outer + half_diagonal {
+                        continue;
+                    }
+                    let cover = if distance + half_diagonal < placed.inner {
+                        Cover::Whole
+                    } else {
+                        let depth = placed.size * body.signed_distance(&placed.local(&offset));
+                        if depth > half_diagonal {
+                            continue;
+                        }
+                        if depth < -half_diagonal {
+                            Cover::Whole
+                        } else {
+                            Cover::Partial
+                        }
+                    };
+                    let turns = Vector3::from_fn(|a, _| index_along[a].div_euclid(self.counts[a] as i64) as f64);
+                    let cell = [0, 1, 2].map(|a| index_along[a].rem_euclid(self.counts[a] as i64) as usize);
+                    let image = Image {
+                        centre: centre - turns.component_mul(&self.sides),
+                        outer_squared: placed.outer * placed.outer,
+                        particle: index as u32,
+                    };
+                    reached.push((self.number(cell) as u32, cover, image));
+                }
+            }
+        }
+        reached
+    }
+
+    /// Sorts the images into their cells, in the order of the particles.
+    fn sort_in(&mut self, reached: &[Vec<(u32, Cover, Image)>]) {
+        for (cell, ..) in reached.iter().flatten() {
+            self.starts[*cell as usize + 1] += 1;
+        }
+        for cell in 0..self.owners.len() {
+            self.starts[cell + 1] += self.starts[cell];
+        }
+        let mut next = self.starts.clone();
+        let nowhere = Image {
+            centre: Point3::origin(),
+            outer_squared: 0.0,
+            particle: 0,
+        };
+        self.images = vec![nowhere; reached.iter().map(Vec::len).sum()];
+        for &(cell, cover, image) in reached.iter().flatten() {
+            let cell = cell as usize;
+            if cover == Cover::Whole && next[cell] == self.starts[cell] {
+                self.owners[cell] = image.particle;
+            }
+            self.images[next[cell] as usize] = image;
+            next[cell] += 1;
+        }
+    }
+
+    fn number(&self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.counts[1] + j) * self.counts[0] + i
+    }
+
+    fn cell_of(&self, p: &Point3<f64>) -> [usize; 3] {
+        [0, 1, 2].map(|k| ((p[k] * self.cells_per_length[k]) as usize).min(self.counts[k] - 1))
+    }
+
+    fn images_in(&self, cell: usize) -> &[Image] {
+        &self.images[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// The particle at a point of the box, lowest index first; some 50 ns.
+    pub(crate) fn particle_at(&self, bodies: &[UnitBody], p: &Point3<f64>) -> Option<usize> {
+        let cell = self.number(self.cell_of(p));
+        if self.owners[cell] != NONE {
+            return Some(self.owners[cell] as usize);
+        }
+        let inside = |image: &&Image| {
+            let offset = p - image.centre;
+            let placed = &self.placed[image.particle as usize];
+            offset.norm_squared() < image.outer_squared && bodies[placed.shape].contains(&placed.local(&offset))
+        };
+        self.images_in(cell)
+            .iter()
+            .find(inside)
+            .map(|image| image.particle as usize)
+    }
+
+    /// Signed distance from a point of the box to the nearest surface: to that of the particle it is in, negative; infinite without particles.
+    pub(crate) fn distance(&self, bodies: &[UnitBody], p: &Point3<f64>) -> f64 {
+        if self.images.is_empty() {
+            return f64::INFINITY;
+        }
+        let depth = |particle: usize, offset: &Vector3<f64>| {
+            let placed = &self.placed[particle];
+            placed.size * bodies[placed.shape].signed_distance(&placed.local(offset))
+        };
+        let home = self.cell_of(p);
+        let to_wall = (0..3)
+            .map(|k| {
+                let from = home[k] as f64 / self.cells_per_length[k];
+                (p[k] - from).min(from + self.cells_per_length[k].recip() - p[k])
+            })
+            .fold(f64::INFINITY, f64::min);
+        let thinnest = self.cells_per_length.max().recip();
+        let mut nearest = f64::INFINITY;
+        let mut seen: Vec<(u32, Vector3<f64>)> = Vec::new();
+        for ring in 0.. {
+            // Everything nearer than this reaches into the rings already seen.
+            if nearest <= to_wall + (f64::from(ring) - 1.0) * thinnest {
+                break;
+            }
+            for_ring(ring, |step| {
+                let raw = [0, 1, 2].map(|k| home[k] as i64 + i64::from(step[k]));
+                let turns = Vector3::from_fn(|k, _| raw[k].div_euclid(self.counts[k] as i64) as f64);
+                let cell = [0, 1, 2].map(|k| raw[k].rem_euclid(self.counts[k] as i64) as usize);
+                let shift = turns.component_mul(&self.sides);
+                for image in self.images_in(self.number(cell)) {
+                    let offset = p - (image.centre + shift);
+                    let key = (image.particle, offset);
+                    if offset.norm() - self.placed[image.particle as usize].outer < nearest && !seen.contains(&key) {
+                        nearest = nearest.min(depth(image.particle as usize, &offset));
+                        seen.push(key);
+                    }
+                }
+            });
+        }
+        nearest
+    }
+}
+
+/// The cells at Chebyshev distance `ring` from the origin.
+fn for_ring(ring: i32, mut visit: impl FnMut([i32; 3])) {
+    for k in -ring..=ring {
+        for j in -ring..=ring {
+            let on_face = k.abs() == ring || j.abs() == ring;
+            let step = if on_face { 1 } else { 2 * ring as usize };
+            for i in (-ring..=ring).step_by(step.max(1)) {
+                visit([i, j, k]);
+            }
+        }
+    }
+}
+
+impl Placed {
+    fn new(particle: &Particle, body: &UnitBody) -> Self {
+        Self {
+            shape: particle.shape,
+            size: particle.size,
+            to_local: particle.orientation.to_rotation_matrix().matrix().transpose() / particle.size,
+            outer: body.bounding_radius() * particle.size,
+            inner: body.inscribed_radius() * particle.size,
+        }
+    }
+
+    fn local(&self, offset: &Vector3<f64>) -> Point3<f64> {
+        Point3::from(self.to_local * offset)
+    }
+}

@@ -1,0 +1,216 @@
+//! One period of the solid as voxels, in memory or in files.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "ids are checked against 2^31 by Solid::new; distances are stored as f32"
+)]
+
+use crate::Solid;
+use crate::solid::{add, to_bytes};
+use nalgebra::Point3;
+use ndarray::ArrayViewMut3;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::str::FromStr;
+use stereology_grid::{Element, Format, GridError, VolumeShape, write_volume};
+
+/// What a voxel says of the point at its centre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Colour: three of `u8`, clamped here and nowhere before.
+    Rgb,
+    /// Particle: `u32`, 0 in the binder, else the particle's index + 1.
+    Id,
+    /// Category: `u8`, 0 in the binder, else the particle's category + 1.
+    Category,
+    /// Distance to the nearest surface of a particle, negative inside: `f32`.
+    Distance,
+}
+
+/// A name that is no channel.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{name}' is no channel; use rgb, id, category or distance")]
+#[non_exhaustive]
+pub struct ChannelError {
+    /// The name given.
+    pub name: String,
+}
+
+impl FromStr for Channel {
+    type Err = ChannelError;
+
+    fn from_str(name: &str) -> Result<Self, ChannelError> {
+        match name {
+            "rgb" => Ok(Self::Rgb),
+            "id" => Ok(Self::Id),
+            "category" => Ok(Self::Category),
+            "distance" => Ok(Self::Distance),
+            _ => Err(ChannelError { name: name.to_owned() }),
+        }
+    }
+}
+
+/// How many voxels one period has along x, y, z, and how large they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelGrid {
+    /// Voxels along x, y, z.
+    pub counts: [usize; 3],
+    /// Edges of a voxel along x, y, z: side / count, so they may differ a little where the box is not cubic.
+    pub spacing: [f64; 3],
+}
+
+impl VoxelGrid {
+    /// The array's shape with this many channels.
+    #[must_use]
+    pub fn shape(&self, channels: usize) -> VolumeShape {
+        let [nx, ny, nz] = self.counts;
+        VolumeShape { nz, ny, nx, channels }
+    }
+
+    /// Centre of voxel (i, j, k) along x, y, z.
+    #[must_use]
+    pub fn centre(&self, [i, j, k]: [usize; 3]) -> Point3<f64> {
+        let along = |n: usize, axis: usize| (n as f64 + 0.5) * self.spacing[axis];
+        Point3::new(along(i, 0), along(j, 1), along(k, 2))
+    }
+}
+
+impl Solid {
+    /// One period with `along_longest` voxels (at least 1) along the longest side and as many along the others as keep them nearly cubic.
+    ///
+    /// ```
+    /// # use nalgebra::Vector3;
+    /// # use stereology_shape::PeriodicBox;
+    /// # use stereology_volume::Solid;
+    /// let period = PeriodicBox::new(Vector3::new(10.0, 20.0, 4.9))?;
+    /// let solid = Solid::new(vec![], vec![], vec![], period, [0.5; 3], None)?;
+    /// assert_eq!(solid.voxel_grid(100).counts, [50, 100, 25]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn voxel_grid(&self, along_longest: usize) -> VoxelGrid {
+        let sides = self.period().sides();
+        let counts = [0, 1, 2].map(|k| {
+            let share = sides[k] / sides.max();
+            // The longest side gets exactly what was asked for, however large that number is.
+            if share >= 1.0 {
+                along_longest.max(1)
+            } else {
+                (share * along_longest as f64).round().max(1.0) as usize
+            }
+        });
+        VoxelGrid {
+            counts,
+            spacing: [0, 1, 2].map(|k| sides[k] / counts[k] as f64),
+        }
+    }
+
+    /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, rows shared among threads.
+    pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
+        fill(grid, z, slab, |p| {
+            let id = self.id_within(p);
+            let mut colour = self.mean_colour(id);
+            if self.residual_voxel().is_some() {
+                colour = add(colour, self.residual_within(p, id.is_some()));
+            }
+            to_bytes(colour)
+        });
+    }
+
+    /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
+    pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
+        fill(grid, z, slab, |p| [self.id_within(p).map_or(0, |id| id as u32 + 1)]);
+    }
+
+    /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
+    pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
+        fill(grid, z, slab, |p| {
+            [self.id_within(p).map_or(0, |id| self.particles()[id].category + 1)]
+        });
+    }
+
+    /// Fills the slab at `z` with signed distances.
+    pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, f32>) {
+        fill(grid, z, slab, |p| [self.distance_at(p) as f32]);
+    }
+
+    /// Writes one period of the solid, `along_longest` voxels along its longest side, as a file of any format; all formats hold the same bytes, at any number of threads.
+    ///
+    /// `progress` is told the share that is done and may break off. Memory beside the solid: one slab.
+    ///
+    /// # Errors
+    ///
+    /// [`GridError`], [`GridError::Cancelled`] included; nothing is left behind then.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
+    /// # use std::ops::ControlFlow;
+    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// use stereology_grid::{Format, read_npy};
+    /// use stereology_volume::{Channel, Solid};
+    /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
+    /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
+    /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
+    /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// # let folder = tempfile::tempdir()?;
+    /// let file = folder.path().join("ids.npy");
+    /// solid.write_voxels(&file, Format::Npy, 64, Channel::Id, &|_| ControlFlow::Continue(()))?;
+    /// let inside = read_npy::<u32>(&file)?.iter().filter(|id| **id == 1).count();
+    /// let fraction = inside as f64 / 64_f64.powi(3);
+    /// assert!((fraction / (std::f64::consts::PI * 36.0 / 1000.0) - 1.0).abs() < 1e-2); // π d³ / 6 over the box
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn write_voxels(
+        &self,
+        path: impl AsRef<Path>,
+        format: Format,
+        along_longest: usize,
+        channel: Channel,
+        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    ) -> Result<(), GridError> {
+        let grid = self.voxel_grid(along_longest);
+        let path = path.as_ref();
+        match channel {
+            Channel::Rgb => self.write(path, format, &grid, 3, progress, Self::fill_rgb),
+            Channel::Id => self.write(path, format, &grid, 1, progress, Self::fill_ids),
+            Channel::Category => self.write(path, format, &grid, 1, progress, Self::fill_categories),
+            Channel::Distance => self.write(path, format, &grid, 1, progress, Self::fill_distances),
+        }
+    }
+
+    fn write<T: Element>(
+        &self,
+        path: &Path,
+        format: Format,
+        grid: &VoxelGrid,
+        channels: usize,
+        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        fill: impl Fn(&Self, &VoxelGrid, usize, ArrayViewMut3<'_, T>),
+    ) -> Result<(), GridError> {
+        let shape = grid.shape(channels);
+        write_volume(path, format, shape, grid.spacing, |z, slab| {
+            fill(self, grid, z, slab);
+            progress((z + 1) as f64 / shape.nz as f64)
+        })
+    }
+}
+
+/// Asks `value` for every voxel of a slab. The centres lie in the box: no wrapping is needed.
+fn fill<T: Send, const CHANNELS: usize>(
+    grid: &VoxelGrid,
+    z: usize,
+    mut slab: ArrayViewMut3<'_, T>,
+    value: impl Fn(&Point3<f64>) -> [T; CHANNELS] + Sync,
+) {
+    let mut rows: Vec<_> = slab.outer_iter_mut().collect();
+    rows.par_iter_mut().enumerate().for_each(|(y, row)| {
+        for (x, mut voxel) in row.outer_iter_mut().enumerate() {
+            for (place, sample) in voxel.iter_mut().zip(value(&grid.centre([x, y, z]))) {
+                *place = sample;
+            }
+        }
+    });
+}

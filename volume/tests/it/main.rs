@@ -1,0 +1,10 @@
+//! Laws of solids, judged by analytic spheres and by brute force.
+#![allow(clippy::float_cmp, reason = "what must be the same is the same to the last bit")]
+#![expect(clippy::unwrap_used, reason = "a failing test panics")]
+
+mod bad_input;
+mod colours;
+mod points;
+mod sections;
+mod spheres;
+mod voxels;

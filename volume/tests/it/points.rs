@@ -1,0 +1,100 @@
+//! What is at a point: the cells against a search through all particles and images, and the answers against each other.
+
+use crate::spheres::{mixture, solid_of, spheres};
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
+use stereology_shape::Body;
+use stereology_volume::Solid;
+
+/// Offsets from every image of every particle that could matter to `p` in the box.
+fn images(solid: &Solid, p: &Point3<f64>) -> Vec<(usize, Point3<f64>)> {
+    let sides = solid.period().sides();
+    let steps = || (-3..=3).map(f64::from);
+    let mut images = Vec::new();
+    for (index, particle) in solid.particles().iter().enumerate() {
+        for (i, (j, k)) in steps().flat_map(|i| steps().flat_map(move |j| steps().map(move |k| (i, (j, k))))) {
+            let moved = p + Vector3::new(i, j, k).component_mul(&sides);
+            images.push((index, particle.to_local(&moved)));
+        }
+    }
+    images
+}
+
+fn body_of(solid: &Solid, particle: usize) -> &stereology_shape::UnitBody {
+    &solid.bodies()[solid.particles()[particle].shape]
+}
+
+fn point() -> impl Strategy<Value = Point3<f64>> {
+    // Multiples of 2^-20: sums with a few periods are exact.
+    prop::array::uniform3(0_u32..1 << 24).prop_map(|c| Point3::from(c.map(|c| f64::from(c) / f64::from(1 << 20))))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn the_particle_is_the_one_that_a_search_through_all_finds(seed in 0_u64..4, points in prop::collection::vec(point(), 24)) {
+        let solid = mixture(seed);
+        for p in points {
+            let p = solid.period().wrap(&p);
+            let found = images(&solid, &p).into_iter().find(|(i, local)| body_of(&solid, *i).contains(local));
+            prop_assert_eq!(solid.id_at(&p), found.map(|(i, _)| i));
+        }
+    }
+
+    #[test]
+    fn the_distance_is_the_smallest_of_all(seed in 0_u64..4, points in prop::collection::vec(point(), 8)) {
+        let solid = spheres(seed);
+        for p in points {
+            let p = solid.period().wrap(&p);
+            let smallest = images(&solid, &p).into_iter()
+                .map(|(i, local)| solid.particles()[i].size * body_of(&solid, i).signed_distance(&local))
+                .fold(f64::INFINITY, f64::min);
+            prop_assert!((solid.distance_at(&p) - smallest).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn everything_repeats_with_the_sides(seed in 0_u64..4, p in point(), steps in prop::array::uniform3(-3_i32..4)) {
+        let solid = mixture(seed);
+        let moved = p + Vector3::from(steps.map(f64::from)).component_mul(&solid.period().sides());
+        prop_assert_eq!(solid.id_at(&p), solid.id_at(&moved));
+        prop_assert_eq!(solid.colour_at(&p), solid.colour_at(&moved));
+        prop_assert_eq!(solid.distance_at(&p), solid.distance_at(&moved));
+    }
+
+    #[test]
+    fn id_category_colour_and_distance_agree(seed in 0_u64..4, p in point()) {
+        let solid = mixture(seed);
+        let (id, distance) = (solid.id_at(&p), solid.distance_at(&p));
+        prop_assert!(distance.abs() < 1e-9 || (distance < 0.0) == id.is_some());
+        prop_assert_eq!(solid.category_at(&p), id.map(|i| solid.particles()[i].category));
+        prop_assert_eq!(solid.colour_at(&p), id.map_or(solid.binder(), |i| solid.colours()[i]));
+    }
+}
+
+/// A body longer than the box meets itself; all its images count.
+#[test]
+fn a_particle_longer_than_the_box_is_everywhere_it_should_be() {
+    let sides = [1.0, 4.0, 4.0];
+    let needle = Body::ellipsoid([3.0, 1.0, 1.0]).unwrap();
+    let solid = solid_of(&[needle], &[(Point3::new(0.25, 1.0, 1.0), 0.5)], sides);
+    for i in 0..4096 {
+        let p = Point3::new(
+            f64::from(i % 16) / 16.0,
+            f64::from(i / 16 % 16) / 4.0,
+            f64::from(i / 256) / 4.0,
+        );
+        let found = images(&solid, &p)
+            .into_iter()
+            .any(|(i, local)| body_of(&solid, i).contains(&local));
+        assert_eq!(solid.id_at(&p).is_some(), found, "{p}");
+    }
+}
+
+#[test]
+fn without_particles_all_is_binder() {
+    let solid = solid_of(&[Body::sphere(1.0).unwrap()], &[], [1.0, 2.0, 4.0]);
+    assert_eq!(solid.id_at(&Point3::new(0.5, 0.5, 0.5)), None);
+    assert_eq!(solid.distance_at(&Point3::origin()), f64::INFINITY);
+}

@@ -1,0 +1,143 @@
+//! Voxels: volumes and slabs of spheres within the bounds of discretisation, channels that agree, the same bytes at any number of threads.
+
+use crate::spheres::{mixture, spheres};
+use ndarray::{Array3, Axis as ArrayAxis};
+use std::f64::consts::PI;
+use std::fs;
+use std::ops::ControlFlow;
+use stereology_grid::{Format, GridError, read_npy};
+use stereology_volume::{Axis, Channel, SlicePlane, Solid};
+
+fn ids(solid: &Solid, n: usize) -> Array3<u32> {
+    let grid = solid.voxel_grid(n);
+    let [nx, ny, nz] = grid.counts;
+    let mut ids = Array3::zeros((nz, ny, nx));
+    for (z, slab) in ids.outer_iter_mut().enumerate() {
+        solid.fill_ids(&grid, z, slab.insert_axis(ArrayAxis(2)));
+    }
+    ids
+}
+
+/// Voxels that the surface does not cut are right, so a sphere's volume in voxels is off by less than the shell of half a voxel's diagonal δ to both sides of its surface. The errors of many spheres cancel: their sum is
+/// within a hundredth of the sum of the shells.
+#[test]
+fn the_fraction_of_voxels_is_the_volume_of_the_spheres() {
+    let n = 96;
+    for seed in 0..3 {
+        let solid = spheres(seed);
+        let ids = ids(&solid, n);
+        let edge = 8.0 / n as f64;
+        let delta = 0.5 * 3.0_f64.sqrt() * edge;
+        let (mut error, mut shells) = (0.0, 0.0);
+        for (i, sphere) in solid.particles().iter().enumerate() {
+            let r = 0.5 * sphere.size;
+            let volume = ids.iter().filter(|&&id| id as usize == i + 1).count() as f64 * edge.powi(3);
+            let shell = 4.0 / 3.0 * PI * ((r + delta).powi(3) - (r - delta).powi(3));
+            let off = volume - 4.0 / 3.0 * PI * r.powi(3);
+            assert!(off.abs() < 0.5 * shell, "{off} {shell}");
+            error += off;
+            shells += shell;
+        }
+        assert!(error.abs() < 0.01 * shells, "{error} {shells}");
+    }
+}
+
+/// A slab of voxels is the section at the height of its centres: circles of area π (r² − h²) within the ring of half a pixel's diagonal.
+#[test]
+fn slabs_of_voxels_are_sections() {
+    let n = 96;
+    let solid = spheres(3);
+    let ids = ids(&solid, n);
+    let edge = 8.0 / n as f64;
+    for (z, slab) in ids.outer_iter().enumerate() {
+        for (i, area) in solid.section_profiles(Axis::Z, (z as f64 + 0.5) * edge) {
+            let voxels = slab.iter().filter(|&&id| id as usize == i + 1).count() as f64 * edge * edge;
+            let ring = 2.0 * PI * (area / PI).sqrt() * 2.0_f64.sqrt() * edge + PI * edge * edge;
+            assert!((voxels - area).abs() <= ring);
+        }
+    }
+}
+
+/// A slice with pixels as large as voxels shows the slab, along every axis of the array (z, y, x).
+#[test]
+fn slices_are_slabs_of_the_array() {
+    let solid = mixture(1);
+    let n = 64;
+    let grid = solid.voxel_grid(n);
+    let ids = ids(&solid, n);
+    let [nx, ny, nz] = grid.counts.map(|n| u32::try_from(n).unwrap());
+    for (axis, array_axis, width, height) in [(Axis::X, 2, ny, nz), (Axis::Y, 1, nx, nz), (Axis::Z, 0, nx, ny)] {
+        let plane = SlicePlane::across(axis, 5.5 * grid.spacing[axis.index()]);
+        let slice = solid.slice_ids(&plane, width, height, grid.spacing[0]).unwrap();
+        assert_eq!(slice, ids.index_axis(ArrayAxis(array_axis), 5));
+    }
+}
+
+#[test]
+fn channels_agree_in_files() {
+    let solid = mixture(2);
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str| {
+        let file = folder.path().join(format!("{name}.npy"));
+        solid
+            .write_voxels(&file, Format::Npy, 32, name.parse().unwrap(), &|_| {
+                ControlFlow::Continue(())
+            })
+            .unwrap();
+        file
+    };
+    let ids = read_npy::<u32>(write("id")).unwrap();
+    let categories = read_npy::<u8>(write("category")).unwrap();
+    let distances = read_npy::<f32>(write("distance")).unwrap();
+    let colours = read_npy::<u8>(write("rgb")).unwrap();
+    assert_eq!(ids.shape(), [32, 8, 16]);
+    assert_eq!(colours.shape(), [32, 8, 16, 3]);
+    for (((&id, &category), &distance), rgb) in ids
+        .iter()
+        .zip(&categories)
+        .zip(&distances)
+        .zip(colours.as_slice().unwrap().chunks(3))
+    {
+        let particle = (id > 0).then(|| id as usize - 1);
+        assert_eq!(category, particle.map_or(0, |i| solid.particles()[i].category + 1));
+        assert!(distance.abs() < 1e-6 || (distance < 0.0) == particle.is_some());
+        let colour = particle.map_or(solid.binder(), |i| solid.colours()[i]);
+        for c in 0..3 {
+            assert!((colour[c] * 255.0 - f32::from(rgb[c])).abs() <= 0.5 + 1e-4);
+        }
+    }
+}
+
+#[test]
+fn bytes_do_not_depend_on_threads() {
+    let solid = mixture(3);
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let file = folder.path().join("v.nrrd");
+            solid
+                .write_voxels(&file, Format::Nrrd, 40, Channel::Rgb, &|_| ControlFlow::Continue(()))
+                .unwrap();
+            let slice = solid.slice(&SlicePlane::across(Axis::Y, 1.0), 70, 90, 0.1).unwrap();
+            (fs::read(file).unwrap(), slice)
+        })
+    };
+    assert!(bytes(1) == bytes(3));
+}
+
+#[test]
+fn cancelling_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let stop = |done: f64| {
+        if done > 0.5 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let file = folder.path().join("v.tif");
+    let cancelled = spheres(0).write_voxels(file, Format::Tiff, 16, Channel::Id, &stop);
+    assert!(matches!(cancelled, Err(GridError::Cancelled)));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}

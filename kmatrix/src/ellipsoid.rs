@@ -1,9 +1,9 @@
 //! Sections of ellipsoids: closed in depth for every direction, smooth quadrature over directions.
 
 use crate::distribution::{Distribution, Table, gauss_8};
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::FRAC_PI_2;
 
-/// The distribution of √(A / A_max) over the profiles of an ellipsoid with these semi-axes, and its mean width.
+/// The distribution of √(A / A_max) over the profiles of an ellipsoid with these semi-axes.
 ///
 /// # Formula
 ///
@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// A(t) = (π a b c / w) (1 − t²)    section at depth t w
 /// F(x) = ⟨w (1 − √max(0, 1 − x² w / c))⟩ / ⟨w⟩,  c the shortest semi-axis
 /// ```
-pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> (Distribution, f64) {
+pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> Distribution {
     let mut axes = semi_axes;
     axes.sort_by(f64::total_cmp);
     let [c, b, a] = axes;
@@ -39,10 +39,7 @@ pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> (Distribution, 
             _ => (1.0 - ellipsoid.mean(theta.sin().powi(-2)) / mean_half_width).clamp(0.0, 1.0),
         })
         .collect();
-    (
-        Distribution::Table(Table::new(angles, values)),
-        2.0 * c * mean_half_width,
-    )
+    Distribution::Table(Table::new(angles, values))
 }
 
 /// Semi-axes over the shortest: 1 ≤ b ≤ a.
@@ -113,30 +110,16 @@ fn smooth_step(v: f64) -> (f64, f64) {
     (v * v * (3.0 - 2.0 * v), 6.0 * v * (1.0 - v))
 }
 
-/// Surface of an ellipsoid with these semi-axes: ∫ of the projected areas' support, by the same quadrature.
-pub(crate) fn surface_area(semi_axes: [f64; 3]) -> f64 {
-    // Cauchy: S = 4 ⟨projected area⟩, and the projection along u has area π √(Σ (a_j a_k u_i)²): the half-width of a dual ellipsoid.
-    let [a, b, c] = semi_axes;
-    let mut dual = [b * c, c * a, a * b];
-    dual.sort_by(f64::total_cmp);
-    let proportions = Proportions {
-        b: dual[1] / dual[0],
-        a: dual[2] / dual[0],
-    };
-    4.0 * PI * dual[0] * proportions.mean(f64::INFINITY)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{distribution, surface_area};
+    use super::distribution;
     use crate::distribution::Distribution;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use std::f64::consts::PI;
+    use stereology_shape::Body;
 
     #[test]
     fn equal_axes_are_a_sphere() {
-        let (law, width) = distribution([2.0; 3], 256);
-        assert_relative_eq!(width, 4.0, epsilon = 1e-12);
+        let law = distribution([2.0; 3], 256);
         for k in 0..=100 {
             let x = f64::from(k) / 100.0;
             assert_abs_diff_eq!(law.at(x), Distribution::Sphere.at(x), epsilon = 1e-7);
@@ -144,40 +127,19 @@ mod tests {
     }
 
     #[test]
-    fn spheroids_have_their_known_mean_width_and_surface() {
-        // Oblate, axes 1, 1, h < 1: mean width = h + asin(e)/e with e² = 1 − h²; prolate 1, 1, k: k + ln(k + √(k²−1))/√(k²−1).
-        let h: f64 = 0.3;
-        let e = (1.0 - h * h).sqrt();
-        assert_relative_eq!(distribution([1.0, h, 1.0], 64).1, h + e.asin() / e, epsilon = 1e-9);
-        assert_relative_eq!(
-            surface_area([1.0, h, 1.0]),
-            2.0 * PI + PI * h * h / e * ((1.0 + e) / (1.0 - e)).ln(),
-            epsilon = 1e-9
-        );
-        let k: f64 = 4.0;
-        let root = (k * k - 1.0).sqrt();
-        assert_relative_eq!(
-            distribution([1.0, 1.0, k], 64).1,
-            k + (k + root).ln() / root,
-            epsilon = 1e-9
-        );
-    }
-
-    #[test]
     fn mean_relative_area_is_volume_over_width() {
         // ∫ x² dF = ⟨A⟩ / A_max = V / (H A_max), by parts 1 − 2 ∫ x F dx.
         for axes in [[1.0, 1.0, 3.0], [1.0, 2.0, 3.0], [0.2, 1.0, 1.1], [1.0, 5.0, 5.0]] {
-            let (law, width) = distribution(axes, 512);
+            let body = Body::ellipsoid(axes).unwrap();
+            let law = distribution(axes, 512);
             let steps = 200_000;
             let mean: f64 = (0..steps)
                 .map(|k| (f64::from(k) + 0.5) / f64::from(steps))
                 .map(|x| 2.0 * x * (1.0 - law.at(x)) / f64::from(steps))
                 .sum();
-            let [a, b, c]: [f64; 3] = axes;
-            let largest = PI * a * b * c / a.min(b).min(c);
             assert_relative_eq!(
                 mean,
-                4.0 / 3.0 * PI * a * b * c / (width * largest),
+                body.volume() / (body.mean_width() * body.largest_section_area()),
                 max_relative = 1e-7
             );
         }

@@ -5,6 +5,7 @@ use crate::ellipsoid;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::PI;
+use stereology_shape::{Body, BodyError};
 
 /// Cells of the table of F where the caller does not choose.
 pub(crate) const DEFAULT_CELLS: usize = 512;
@@ -57,67 +58,42 @@ pub(crate) struct Calipers {
     pub(crate) effective_error: f64,
 }
 
-/// A length of a body must be a positive number.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("a diameter or semi-axis must be a positive, finite number, not {0}")]
-#[non_exhaustive]
-pub struct LengthError(pub f64);
-
-fn positive(length: f64) -> Result<f64, LengthError> {
-    if length.is_finite() && length > 0.0 {
-        Ok(length)
-    } else {
-        Err(LengthError(length))
-    }
-}
-
 impl SectionLaw {
     /// The law of a sphere, in closed form: eq. (3).
     ///
     /// # Errors
     ///
-    /// [`LengthError`] if the diameter is not positive and finite.
-    pub fn sphere(diameter: f64) -> Result<Self, LengthError> {
-        let d = positive(diameter)?;
-        Ok(Self::convex(
-            Distribution::Sphere,
-            d,
-            0.25 * PI * d * d,
-            PI / 6.0 * d * d * d,
-            PI * d * d,
-        ))
+    /// [`BodyError`] if the diameter is no length.
+    pub fn sphere(diameter: f64) -> Result<Self, BodyError> {
+        Body::sphere(diameter).map(|body| Self::sphere_of(&body))
     }
 
     /// The law of an ellipsoid: closed in depth, by smooth quadrature over directions; F is right to about 1e-7.
     ///
     /// # Errors
     ///
-    /// [`LengthError`] if a semi-axis is not positive and finite.
+    /// [`BodyError`] if a semi-axis is no length.
     ///
     /// ```
     /// let needle = stereology_kmatrix::SectionLaw::ellipsoid([1.0, 1.0, 4.0])?;
     /// assert!((needle.max_area() - 4.0 * std::f64::consts::PI).abs() < 1e-12);
     /// assert!(needle.cdf(0.6) > 0.5); // most cuts go across it
-    /// # Ok::<(), stereology_kmatrix::LengthError>(())
+    /// # Ok::<(), stereology_shape::BodyError>(())
     /// ```
-    pub fn ellipsoid(semi_axes: [f64; 3]) -> Result<Self, LengthError> {
-        for length in semi_axes {
-            positive(length)?;
-        }
-        let [a, b, c] = semi_axes;
-        let (distribution, width) = ellipsoid::distribution(semi_axes, DEFAULT_CELLS);
-        let max_area = PI * a.max(b).max(c) * a.min(b).max(a.max(b).min(c));
-        let volume = 4.0 / 3.0 * PI * a * b * c;
-        Ok(Self::convex(
-            distribution,
-            width,
-            max_area,
-            volume,
-            ellipsoid::surface_area(semi_axes),
-        ))
+    pub fn ellipsoid(semi_axes: [f64; 3]) -> Result<Self, BodyError> {
+        Body::ellipsoid(semi_axes).map(|body| Self::ellipsoid_of(&body, semi_axes))
     }
 
-    fn convex(distribution: Distribution, width: f64, max_area: f64, volume: f64, surface_area: f64) -> Self {
+    pub(crate) fn sphere_of(body: &Body) -> Self {
+        Self::closed_form(body, Distribution::Sphere)
+    }
+
+    pub(crate) fn ellipsoid_of(body: &Body, semi_axes: [f64; 3]) -> Self {
+        Self::closed_form(body, ellipsoid::distribution(semi_axes, DEFAULT_CELLS))
+    }
+
+    fn closed_form(body: &Body, distribution: Distribution) -> Self {
+        let width = body.mean_width();
         Self {
             distribution,
             samples: Vec::new(),
@@ -127,10 +103,10 @@ impl SectionLaw {
                 effective: width,
                 effective_error: 0.0,
             },
-            max_area,
-            largest_met: max_area,
-            volume,
-            surface_area,
+            max_area: body.largest_section_area(),
+            largest_met: body.largest_section_area(),
+            volume: body.volume(),
+            surface_area: body.surface_area(),
             directions: 0,
         }
     }
@@ -338,7 +314,6 @@ mod tests {
         }
     }
 
-    /// Student's t: with 32 rotations a false-alarm rate of 1e-6 is 6.1 standard errors; without rotations nothing is claimed.
     #[test]
     fn columns_of_an_ellipsoid_sum_to_relative_size() {
         let matrix = SectionLaw::ellipsoid([1.0, 2.0, 3.0]).unwrap().k_matrix(10);

@@ -1,1 +1,64 @@
 //! From a photograph of a cut through a material to the solid it came from.
+//!
+//! Classical stereology turns a picture of particles in a binder (terrazzo, concrete, igneous rock, foam) into a faithful solid: profiles are
+//! segmented, their sizes unfolded to particles per volume, such particles packed into a box that repeats, coloured, and covered with the fine
+//! residual of the photograph (Jagnow, Dorsey & Rushmeier 2004). Each step is a crate of its own, re-exported here behind a feature of the same name:
+//!
+//! | module | question |
+//! |---|---|
+//! | [`shape`] | What is this particle's volume, width, section? |
+//! | [`grid`] | How do arrays get into files that others read? |
+//! | [`spectrum`] | What frequencies does a field hold? |
+//! | [`kmatrix`] | How often does a random plane show a body at each size? |
+//! | [`unfold`] | Which particles per volume gave these profiles per area? |
+//! | [`segment`] | Where are the profiles in a photograph? |
+//! | [`anneal`] | Where can particles lie without overlap, and what proves it? |
+//! | [`pyramid`] | What texture looks like this one? |
+//! | [`volume`] | Which colour is at this point of the solid? |
+//! | [`render`] | What does it look like? |
+//!
+//! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.
+//!
+//! # Examples
+//!
+//! How many spheres per volume gave these profiles?
+//!
+//! ```
+//! use stereology::pipeline::ParticleTypes;
+//! use stereology::kmatrix::Sizes;
+//! use stereology::unfold::{ProfileCounts, UnfoldOptions, equal_edges, unfold};
+//!
+//! let edges = equal_edges(1.0, 5);
+//! let kernel = ParticleTypes::parse(&["sphere"])?.kernel(&edges, &edges, Sizes::Integrated)?;
+//! let sizes = [0.31, 0.42, 0.55, 0.58, 0.66, 0.71, 0.74, 0.78, 0.79, 0.80];
+//! let counts = ProfileCounts::from_sizes(&sizes, None, &edges, 25.0)?;
+//! let densities = unfold(&counts, &kernel, &UnfoldOptions::default())?;
+//! assert!((densities.total.value - 0.55).abs() < 0.15); // 10 / 25 profiles per area over a mean diameter of about .75
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#[cfg(feature = "pipeline")]
+pub mod files;
+#[cfg(feature = "pipeline")]
+pub mod pipeline;
+
+#[cfg(feature = "anneal")]
+pub use stereology_anneal as anneal;
+#[cfg(feature = "grid")]
+pub use stereology_grid as grid;
+#[cfg(feature = "kmatrix")]
+pub use stereology_kmatrix as kmatrix;
+#[cfg(feature = "pyramid")]
+pub use stereology_pyramid as pyramid;
+#[cfg(feature = "render")]
+pub use stereology_render as render;
+#[cfg(feature = "segment")]
+pub use stereology_segment as segment;
+#[cfg(feature = "shape")]
+pub use stereology_shape as shape;
+#[cfg(feature = "spectrum")]
+pub use stereology_spectrum as spectrum;
+#[cfg(feature = "unfold")]
+pub use stereology_unfold as unfold;
+#[cfg(feature = "volume")]
+pub use stereology_volume as volume;

@@ -2,6 +2,8 @@
 //!
 //! SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED` or a mesh file; a box of 1 by 2 by 3 if none is given.
 
+#![expect(clippy::print_stdout, reason = "an example shows its result")]
+
 use std::error::Error;
 use stereology_kmatrix::{SectionLaw, SectionOptions};
 use stereology_shape::Body;

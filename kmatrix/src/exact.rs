@@ -245,22 +245,23 @@ fn of_mesh(
             .collect()
     };
     let finish = |samples: &[Sample], count: usize| {
-        let holes = standard_error(samples.iter().map(|sample| sample.moments.holes)) * surface.reach;
-        let mean_holes =
-            samples.iter().map(|sample| sample.moments.holes).sum::<f64>() / samples.len() as f64 * surface.reach;
+        let mean = |of: fn(&Moments) -> f64| {
+            samples.iter().map(|sample| of(&sample.moments)).sum::<f64>() / samples.len() as f64
+        };
+        let error = |of: fn(&Moments) -> f64| standard_error(samples.iter().map(|sample| of(&sample.moments)));
+        let chi = body.signed_mean_width();
         let lengths = Calipers {
             hull: body.mean_width(),
-            chi: body.signed_mean_width(),
-            effective: body.signed_mean_width() + mean_holes,
-            effective_error: holes,
+            chi,
+            effective: chi + mean(|moments| moments.holes) * surface.reach,
+            effective_error: error(|moments| moments.holes) * surface.reach,
         };
-        SectionLaw::from_samples(
-            body,
-            samples,
-            lengths,
-            surface.reach * surface.reach,
-            count * options.rotations,
-        )
+        let apart = (mean(|moments| moments.profiles - moments.holes) - chi / surface.reach).abs();
+        // Heights are rounded to 2^-26 of the reach.
+        let chi_discrepancy = apart / error(|moments| moments.profiles - moments.holes).max(1e-7);
+        let area_unit = surface.reach * surface.reach;
+        let law = SectionLaw::from_samples(body, samples, lengths, area_unit, count * options.rotations)?;
+        Ok(SectionLaw { chi_discrepancy, ..law })
     };
     match options.effort {
         Effort::Directions(directions) => {
@@ -350,6 +351,7 @@ impl SectionLaw {
             volume: body.volume(),
             surface_area: body.surface_area(),
             directions,
+            chi_discrepancy: 0.0,
         })
     }
 }

@@ -47,6 +47,8 @@ pub struct SectionLaw {
     pub(crate) volume: f64,
     pub(crate) surface_area: f64,
     pub(crate) directions: usize,
+    /// |swept profiles − holes − H_chi| in standard errors.
+    pub(crate) chi_discrepancy: f64,
 }
 
 /// The mean lengths of the measure of planes that hit, by what is counted.
@@ -108,6 +110,7 @@ impl SectionLaw {
             volume: body.volume(),
             surface_area: body.surface_area(),
             directions: 0,
+            chi_discrepancy: 0.0,
         }
     }
 
@@ -175,6 +178,15 @@ impl SectionLaw {
     #[must_use]
     pub fn caliper_chi(&self) -> f64 {
         self.lengths.chi
+    }
+
+    /// How far the sweep's own count of profiles minus holes is from H_chi, in standard errors of the sweep.
+    ///
+    /// Both are the same number for any mesh that bounds a solid. Beyond 6 the mesh cuts through itself, and neither its sections nor this law
+    /// mean anything. Zero for closed forms and Monte Carlo.
+    #[must_use]
+    pub fn chi_discrepancy(&self) -> f64 {
+        self.chi_discrepancy
     }
 
     /// H_eff: mean profiles; N_A = H_eff K N_V.

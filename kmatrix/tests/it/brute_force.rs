@@ -52,7 +52,7 @@ fn sweep_agrees_with_random_sections_of_bodies_with_holes_and_arms() {
         ("angle", angle()),
         ("hollow cube", hollow_cube()),
     ] {
-        agree(name, &body(triangles), 10_000);
+        agree(name, &body(triangles), 6_000);
     }
 }
 

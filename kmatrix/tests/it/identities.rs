@@ -68,7 +68,7 @@ fn mean_profile_area_is_volume_over_effective_caliper() {
 /// A smooth torus has H_chi = π R and the hull's mean width 2 r + π R / 2.
 #[test]
 fn torus_has_its_known_lengths() {
-    let law = law(&body(TriangleMesh::torus(2.0, 0.5, 96, 32)), 32);
+    let law = law(&body(TriangleMesh::torus(2.0, 0.5, 96, 32)), 32 * 8);
     assert_relative_eq!(law.caliper_chi(), std::f64::consts::PI, max_relative = 3e-3);
     assert_relative_eq!(
         law.caliper_hull(),

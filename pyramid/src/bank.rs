@@ -169,7 +169,7 @@ impl<T: Real> FilterBank<T> {
             for (filter, range) in level.bands.iter().zip(&mut ranges) {
                 if self.quadrature {
                     pair(bins, spectrum, filter, |out, v, f| {
-                        *out = Complex::new(-v.im * f, v.re * f)
+                        *out = Complex::new(-v.im * f, v.re * f);
                     });
                 } else {
                     pair(bins, spectrum, filter, |out, v, f| *out = v * f);
@@ -231,7 +231,7 @@ impl<T: Real> FilterBank<T> {
         let scale = per_sample(first);
         first.forward_into(&coefficients[self.ranges[0].clone()], band, &mut work[0]);
         pair(&mut spectra[0], band, &self.high_filter, |out, v, f| {
-            *out = *out + v * (f * scale)
+            *out = *out + v * (f * scale);
         });
         first.inverse_into(&mut spectra[0], field, &mut work[0]);
     }

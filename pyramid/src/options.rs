@@ -1,0 +1,214 @@
+//! What a synthesis is given and what it says about itself.
+
+/// How a volume is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Slices along all three axes look like the exemplar: a start with the right spectrum, then the bands of every slice
+    /// are matched, orientations pooled. The default.
+    #[default]
+    Slices,
+    /// A start whose slices have the exemplar's spectrum, then 3D bands of matched shape and corrected variance. Twice
+    /// the band error of [`Mode::Slices`] or more, several times as fast.
+    Spectrum,
+    /// Heeger & Bergen's method with three-dimensional bands, as Jagnow, Dorsey & Rushmeier 2004 use it: 3D bands get
+    /// the histograms of the exemplar's 2D bands. Slices then miss the exemplar's band variances by 20 to 40 %.
+    Volume,
+}
+
+/// How histograms are matched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Matching {
+    /// A table of 4096 bins: [`match_histogram_table`](crate::match_histogram_table).
+    #[default]
+    Table,
+    /// Ranks: [`match_histogram`](crate::match_histogram).
+    Exact,
+}
+
+/// Options of [`synthesize_image`](crate::synthesize_image) and [`synthesize_volume`](crate::synthesize_volume).
+///
+/// # Examples
+///
+/// ```
+/// use stereology_pyramid::{Mode, TextureOptions};
+///
+/// let options = TextureOptions::default().with_mode(Mode::Volume).with_seed(7);
+/// assert_eq!((options.iterations, options.orientations), (5, 4));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct TextureOptions {
+    /// How a volume is made; images know one way only.
+    pub mode: Mode,
+    /// Rounds of matching, 5 by default. More than 10 change nothing that can be seen.
+    pub iterations: usize,
+    /// Levels of the pyramid; by default as many as leave the coarsest bands 16 samples along the shortest side of
+    /// exemplar and result.
+    pub levels: Option<usize>,
+    /// Orientations of the 2D pyramid, 4 by default. The 3D bands of the other modes have none.
+    pub orientations: usize,
+    /// How histograms are matched.
+    pub matching: Matching,
+    /// Same seed, same bits.
+    pub seed: u64,
+    /// Bytes of memory that a synthesis may ask for, 4 GiB by default; beyond, it is refused before it starts.
+    pub memory_limit: u64,
+}
+
+impl Default for TextureOptions {
+    fn default() -> Self {
+        Self {
+            mode: Mode::default(),
+            iterations: 5,
+            levels: None,
+            orientations: 4,
+            matching: Matching::default(),
+            seed: 0,
+            memory_limit: 4 << 30,
+        }
+    }
+}
+
+impl TextureOptions {
+    /// With another [`Self::mode`].
+    #[must_use]
+    pub fn with_mode(mut self, mode: Mode) -> Self {
+        self.mode = mode;
+        self
+    }
+
+    /// With another number of [`Self::iterations`].
+    #[must_use]
+    pub fn with_iterations(mut self, iterations: usize) -> Self {
+        self.iterations = iterations;
+        self
+    }
+
+    /// With a given number of [`Self::levels`].
+    #[must_use]
+    pub fn with_levels(mut self, levels: usize) -> Self {
+        self.levels = Some(levels);
+        self
+    }
+
+    /// With another number of [`Self::orientations`].
+    #[must_use]
+    pub fn with_orientations(mut self, orientations: usize) -> Self {
+        self.orientations = orientations;
+        self
+    }
+
+    /// With another way of [`Self::matching`].
+    #[must_use]
+    pub fn with_matching(mut self, matching: Matching) -> Self {
+        self.matching = matching;
+        self
+    }
+
+    /// With another [`Self::seed`].
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// With another [`Self::memory_limit`], in bytes.
+    #[must_use]
+    pub fn with_memory_limit(mut self, bytes: u64) -> Self {
+        self.memory_limit = bytes;
+        self
+    }
+}
+
+/// A texture cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TextureError {
+    /// The exemplar is too small.
+    #[error("the exemplar has {height} x {width} pixels: a texture needs at least 8 x 8")]
+    ExemplarTooSmall {
+        /// Rows.
+        height: usize,
+        /// Columns.
+        width: usize,
+    },
+    /// The exemplar has no channels.
+    #[error("the exemplar has no colour channels")]
+    NoChannels,
+    /// A pixel that counts is NaN or infinite.
+    #[error("the exemplar's pixel at row {row}, column {column} is NaN or infinite: mend it or mask it out")]
+    NotFinite {
+        /// Row.
+        row: usize,
+        /// Column.
+        column: usize,
+    },
+    /// Mask and exemplar differ in shape.
+    #[error("the mask has {mask:?} pixels (rows, columns), the exemplar {image:?}")]
+    MaskShape {
+        /// Rows and columns of the mask.
+        mask: [usize; 2],
+        /// Rows and columns of the exemplar.
+        image: [usize; 2],
+    },
+    /// The mask leaves too little to take statistics from.
+    #[error("the mask leaves {selected} pixels: statistics need at least {needed}")]
+    MaskTooSmall {
+        /// Pixels in the mask.
+        selected: usize,
+        /// Pixels needed.
+        needed: usize,
+    },
+    /// The result is asked for too small.
+    #[error("a texture of {shape:?} samples cannot be made: every side needs at least 8")]
+    ResultTooSmall {
+        /// Shape asked for.
+        shape: Vec<usize>,
+    },
+    /// The synthesis would need more memory than allowed.
+    #[error(
+        "a texture of {shape:?} samples needs about {bytes} bytes of memory, the limit is {limit}: make it smaller or raise the limit"
+    )]
+    TooLarge {
+        /// Shape asked for.
+        shape: Vec<usize>,
+        /// Bytes needed.
+        bytes: u128,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// No level, or no orientation or too many.
+    #[error("a texture needs at least one level and 1 to 32 orientations, not {levels} and {orientations}")]
+    Options {
+        /// Levels asked for.
+        levels: usize,
+        /// Orientations asked for.
+        orientations: usize,
+    },
+    /// The caller's progress function asked to stop.
+    #[error("the synthesis was cancelled")]
+    Cancelled,
+}
+
+/// Something the user of a texture should know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Finding {
+    /// Fixed word: `levels-reduced`, `few-samples`, `constant-exemplar`.
+    pub code: &'static str,
+    /// What was found, in a sentence.
+    pub message: String,
+}
+
+/// What a synthesis did.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct TextureReport {
+    /// Levels of the pyramid that were used.
+    pub levels: usize,
+    /// Before each round of matching, how far the bands still were from their targets: root mean square over bands and
+    /// colour components of ln(variance / target variance).
+    pub band_errors: Vec<f64>,
+    /// What the user should know.
+    pub findings: Vec<Finding>,
+}

@@ -1,0 +1,117 @@
+//! What is settled before a synthesis starts: levels, memory, and the noise it starts from.
+
+use ndarray::{Array, Dimension, IntoDimension};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+use crate::bank::{level_shape, most_levels};
+use crate::exemplar::Prepared;
+use crate::{Exemplar, Finding, TextureError, TextureOptions, TextureReport};
+
+/// Samples along the shortest side of the coarsest oriented bands that the default number of levels leaves.
+const COARSEST: usize = 16;
+
+pub(crate) struct Plan {
+    pub(crate) levels: usize,
+    asked: Option<usize>,
+}
+
+impl Plan {
+    /// Checks what needs no look at the pixels. `shape` is the result's.
+    pub(crate) fn new(
+        exemplar: &Exemplar<'_>,
+        shape: &[usize],
+        options: &TextureOptions,
+    ) -> Result<Self, TextureError> {
+        let (height, width, channels) = exemplar.image.dim();
+        if height < 8 || width < 8 {
+            return Err(TextureError::ExemplarTooSmall { height, width });
+        }
+        if shape.iter().any(|&n| n < 8) {
+            return Err(TextureError::ResultTooSmall { shape: shape.to_vec() });
+        }
+        if options.levels == Some(0) || options.orientations == 0 || options.orientations > 32 {
+            let levels = options.levels.unwrap_or(1);
+            return Err(TextureError::Options {
+                levels,
+                orientations: options.orientations,
+            });
+        }
+        let bytes = bytes_needed(shape, channels, options.orientations);
+        if bytes > u128::from(options.memory_limit) {
+            return Err(TextureError::TooLarge {
+                shape: shape.to_vec(),
+                bytes,
+                limit: options.memory_limit,
+            });
+        }
+        let shortest = shape.iter().copied().fold(height.min(width), usize::min);
+        let most = most_levels(&[shortest]);
+        let usual = (1..=most)
+            .take_while(|&l| l == 1 || level_shape(&[shortest], l - 1)[0] >= COARSEST)
+            .count();
+        Ok(Self {
+            levels: options.levels.map_or(usual, |asked| asked.min(most)),
+            asked: options.levels,
+        })
+    }
+
+    pub(crate) fn report(&self, exemplar: &Prepared) -> TextureReport {
+        let mut findings = Vec::new();
+        if let Some(asked) = self.asked.filter(|&asked| asked > self.levels) {
+            let message = format!("{asked} levels are too many for these sizes: {} were used", self.levels);
+            findings.push(Finding {
+                code: "levels-reduced",
+                message,
+            });
+        }
+        if !exemplar.varies(0) {
+            let message = "the exemplar is one colour: so is the texture".to_owned();
+            findings.push(Finding {
+                code: "constant-exemplar",
+                message,
+            });
+        }
+        TextureReport {
+            levels: self.levels,
+            band_errors: Vec::new(),
+            findings,
+        }
+    }
+}
+
+/// Bytes a synthesis asks for at its peak, about: components, channels and the interleaved result, and the coefficients of
+/// one component with their spectra.
+fn bytes_needed(shape: &[usize], channels: usize, orientations: usize) -> u128 {
+    let samples: u128 = shape.iter().map(|&n| n as u128).product();
+    let colours = 3 * channels as u128;
+    let coefficients = 4 + 4 * orientations as u128 / 3;
+    let together = if shape.len() == 2 { channels as u128 } else { 1 };
+    4 * samples.saturating_mul(colours + together * coefficients)
+}
+
+/// Gaussian noise of unit variance: one random stream a row of `row` samples, so that any thread can make any row.
+pub(crate) fn white_noise(samples: usize, row: usize, seed: u64, component: usize) -> Vec<f32> {
+    let mut noise = vec![0.0_f32; samples];
+    noise.par_chunks_mut(row).enumerate().for_each(|(i, row)| {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream((component as u64) << 40 | i as u64);
+        row.iter_mut().for_each(|v| *v = random.sample(StandardNormal));
+    });
+    noise
+}
+
+/// Root of the mean over all bands of sums of squares.
+pub(crate) fn root_mean_square(errors: &[(f64, usize)]) -> f64 {
+    let (sum, n) = errors.iter().fold((0.0, 0), |(sum, n), &(s, m)| (sum + s, n + m));
+    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
+}
+
+/// The finished values as an array.
+pub(crate) fn shaped<I: IntoDimension>(shape: I, values: Vec<f32>) -> Array<f32, I::Dim> {
+    let shape = shape.into_dimension();
+    debug_assert_eq!(shape.size(), values.len());
+    Array::from_shape_vec(shape, values).expect("a value for every sample and channel")
+}

@@ -1,0 +1,121 @@
+//! Heeger-Bergen synthesis of images.
+
+use std::ops::ControlFlow;
+
+use ndarray::Array3;
+use rayon::prelude::*;
+
+use crate::bank::FilterBank;
+use crate::canvas::{Canvas, match_bands};
+use crate::exemplar::{Analysis, Exemplar, Pooling, Prepared};
+use crate::plan::{Plan, root_mean_square, shaped, white_noise};
+use crate::{TextureError, TextureOptions, TextureReport};
+
+/// An image of any size that looks like the exemplar, and repeats without a seam.
+///
+/// White noise gets the exemplar's distribution of colours and of the bands of its steerable pyramid, in turns; the colours
+/// are matched last. The exemplar's edges are taken care of by its periodic component, its channels by their principal
+/// axes. Of `options`, the mode is of no account. Same seed, same bits, at any number of threads.
+///
+/// Cost: two pyramids of the result a round and channel; 512 x 512 in colour takes about a second.
+///
+/// # Errors
+///
+/// [`TextureError`]: an exemplar or result under 8 pixels, NaN, too little in the mask, a result beyond the memory limit,
+/// a progress function that says break.
+///
+/// # References
+///
+/// Heeger & Bergen 1995; Briand, Vacher, Galerne & Rabin, IPOL 2014 (edges).
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array3;
+/// use std::ops::ControlFlow;
+/// use stereology_pyramid::{Exemplar, TextureOptions, synthesize_image};
+///
+/// let speckle = Array3::from_shape_fn((32, 32, 3), |(y, x, c)| ((7 * y + 13 * x * x + c) % 11) as f32 / 11.0);
+/// let texture = synthesize_image(
+///     &Exemplar::new(speckle.view()), [40, 24], &TextureOptions::default(), &|_| ControlFlow::Continue(()),
+/// )?;
+/// assert_eq!(texture.dim(), (40, 24, 3));
+/// assert!((texture.mean().unwrap() - speckle.mean().unwrap()).abs() < 0.01);
+/// # Ok::<(), stereology_pyramid::TextureError>(())
+/// ```
+pub fn synthesize_image(
+    exemplar: &Exemplar<'_>,
+    size: [usize; 2],
+    options: &TextureOptions,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<Array3<f32>, TextureError> {
+    synthesize_image_with_report(exemplar, size, options, progress).map(|(image, _)| image)
+}
+
+/// As [`synthesize_image`], with a report of what was done: levels used, how the bands converged, what to know.
+///
+/// # Errors
+///
+/// As [`synthesize_image`].
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array3;
+/// use std::ops::ControlFlow;
+/// use stereology_pyramid::{Exemplar, TextureOptions, synthesize_image_with_report};
+///
+/// let grey = Array3::from_elem((16, 16, 3), 0.5);
+/// let (texture, report) = synthesize_image_with_report(
+///     &Exemplar::new(grey.view()), [8, 8], &TextureOptions::default(), &|_| ControlFlow::Continue(()),
+/// )?;
+/// assert!(texture.iter().all(|v| (v - 0.5).abs() < 1e-6));
+/// assert_eq!(report.findings[0].code, "constant-exemplar");
+/// # Ok::<(), stereology_pyramid::TextureError>(())
+/// ```
+pub fn synthesize_image_with_report(
+    exemplar: &Exemplar<'_>,
+    size: [usize; 2],
+    options: &TextureOptions,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<(Array3<f32>, TextureReport), TextureError> {
+    let plan = Plan::new(exemplar, &size, options)?;
+    let exemplar = Prepared::new(exemplar)?;
+    let mut report = plan.report(&exemplar);
+    let analysis = Analysis::new(&exemplar, plan.levels, options.orientations);
+    report.findings.extend(analysis.findings.iter().cloned());
+    let bank = FilterBank::new(&size, plan.levels, options.orientations);
+    let samples = size[0] * size[1];
+    let count = exemplar.components.len();
+    let targets: Vec<_> = (0..count)
+        .map(|c| {
+            exemplar
+                .varies(c)
+                .then(|| analysis.targets(&exemplar.components[c], Pooling::Apart))
+        })
+        .collect();
+    let start = (0..count)
+        .map(|c| {
+            if exemplar.varies(c) {
+                white_noise(samples, size[1], options.seed, c)
+            } else {
+                vec![0.0; samples]
+            }
+        })
+        .collect();
+    let mut canvas = Canvas::new(start, &exemplar, options.matching);
+    for round in 0..options.iterations {
+        canvas.match_channels();
+        let errors: Vec<(f64, usize)> = canvas
+            .components
+            .par_iter_mut()
+            .zip(&targets)
+            .filter_map(|(field, targets)| Some(match_bands(field, &bank, targets.as_ref()?, options.matching)))
+            .collect();
+        report.band_errors.push(root_mean_square(&errors));
+        if progress((round + 1) as f64 / options.iterations as f64).is_break() {
+            return Err(TextureError::Cancelled);
+        }
+    }
+    Ok((shaped((size[0], size[1], count), canvas.finish()), report))
+}

@@ -108,6 +108,8 @@ impl Packing {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn verify(bodies: &[UnitBody], particles: Vec<Particle>, period: &PeriodicBox) -> Result<Self, VerifyError> {
+        // First, because wrapping would hide positions that are not numbers.
+        check(bodies, &particles, period)?;
         let particles: Vec<Particle> = particles
             .into_iter()
             .map(|p| Particle {

@@ -184,8 +184,9 @@ impl Motion {
         let mean = assembly.radius.iter().sum::<f64>() / count.max(1) as f64;
         // A large particle is held by as many contacts as its surface has room for: mass by surface keeps all frequencies alike.
         let mass: Vec<f64> = assembly.radius.iter().map(|r| (r / mean).powi(2).max(1.0)).collect();
+        // A contact at the far end of a rod turns it most easily.
         let inertia = (0..turning)
-            .map(|i| 0.5 * mass[i] * assembly.radius[i].powi(2))
+            .map(|i| 0.4 * mass[i] * assembly.reach(i).powi(2))
             .collect();
         Self {
             velocity: vec![Vector3::zeros(); count],

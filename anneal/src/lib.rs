@@ -5,7 +5,7 @@
 //! exactly the one asked for. Spheres, ellipsoids and convex meshes mix freely; a particle may be larger than half the box.
 //!
 //! - How deep a pair overlaps is the factor `γ = max n·d / (h_A(n) + h_B(−n))` by which it would have to shrink to part: one maximum, however deep.
-//! - [`pack`] minimises `Σ ½ R² (1 + ε − γ)²` by descent with momentum, in tens to hundreds of iterations; [`Mode::Paper`] keeps the way of the paper.
+//! - [`pack`] minimises the sum of squared depths by descent with momentum, in tens to hundreds of iterations; [`Mode::Paper`] keeps the way of the paper.
 //! - [`Packing`] can only be made by [`Packing::verify`], which moves nothing and finds for every pair and every periodic image a direction that separates it.
 //!   "No overlap seen while moving" proves nothing: such a run has left overlaps of 8.5 10⁻⁴ diameters.
 //!

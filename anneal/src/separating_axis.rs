@@ -60,3 +60,96 @@ fn add(list: &mut Vec<Vector3<f64>>, direction: Vector3<f64>) {
         list.push(unit);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::best_axis;
+    use crate::difference::Posed;
+    use crate::gauge::{Gauge, Search};
+    use nalgebra::{Matrix3, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use stereology_shape::{Body, UnitBody, isotropic_rotation};
+
+    const SEARCH: Search = Search {
+        enough: f64::INFINITY,
+        precision: 1e-13,
+        steps: 200,
+    };
+
+    /// The portal search and the separating axes are two ways to one number, deep inside or far apart.
+    #[test]
+    fn searching_finds_the_best_axis() {
+        let bodies = [Body::rock(1), Body::rock(2), Body::cuboid([1.0, 2.0, 0.3]).unwrap()];
+        let bodies: Vec<UnitBody> = bodies.iter().map(UnitBody::new).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for case in 0..60 {
+            let turns: [Matrix3<f64>; 2] =
+                std::array::from_fn(|_| isotropic_rotation(&mut rng).to_rotation_matrix().into_inner());
+            let a = Posed {
+                body: &bodies[case % 3],
+                size: 1.0,
+                rotation: &turns[0],
+            };
+            let b = Posed {
+                body: &bodies[case / 3 % 3],
+                size: 0.7,
+                rotation: &turns[1],
+            };
+            let d = Vector3::from_fn(|_, _| 2.0 * rng.random::<f64>() - 1.0);
+            let found = Gauge::search(&a, &b, &d, &SEARCH);
+            let (expected, _) = best_axis(&a, &b, &d).unwrap();
+            assert!(
+                (found.value / expected - 1.0).abs() < 1e-9,
+                "{case}: {} {expected}",
+                found.value
+            );
+            assert!(found.at_most >= expected * (1.0 - 1e-12));
+        }
+    }
+
+    /// Aligned cubes, where the ray meets corners and edges of the difference body.
+    #[test]
+    fn aligned_cubes_have_the_largest_component() {
+        let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
+        let turn = Matrix3::identity();
+        let posed = Posed {
+            body: &cube,
+            size: cube.body().size(),
+            rotation: &turn,
+        };
+        for k in 1..125_i32 {
+            let d = Vector3::new(f64::from(k % 5), f64::from(k / 5 % 5), f64::from(k / 25)) * 0.25;
+            let found = Gauge::search(&posed, &posed, &d, &SEARCH);
+            let (axis, _) = best_axis(&posed, &posed, &d).unwrap();
+            assert!((axis - d.max()).abs() < 1e-12, "{d:?}");
+            assert!((found.value - d.max()).abs() < 1e-9 || found.at_most > d.max(), "{d:?}");
+        }
+    }
+
+    /// The points at which shrunken bodies meet are the same point of the world.
+    #[test]
+    fn bodies_meet_in_one_point() {
+        let rock = UnitBody::new(&Body::rock(5));
+        let ball = UnitBody::new(&Body::ellipsoid([1.0, 0.7, 0.5]).unwrap());
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for _ in 0..50 {
+            let turns: [Matrix3<f64>; 2] =
+                std::array::from_fn(|_| isotropic_rotation(&mut rng).to_rotation_matrix().into_inner());
+            let a = Posed {
+                body: &rock,
+                size: 1.0,
+                rotation: &turns[0],
+            };
+            let b = Posed {
+                body: &ball,
+                size: 1.3,
+                rotation: &turns[1],
+            };
+            let d = Vector3::from_fn(|_, _| 2.0 * rng.random::<f64>() - 1.0);
+            let found = Gauge::search(&a, &b, &d, &SEARCH);
+            let gap = d + found.on_b * found.value - found.on_a * found.value;
+            assert!(gap.norm() < 1e-5, "{gap:?}");
+        }
+    }
+}

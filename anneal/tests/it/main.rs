@@ -1,0 +1,10 @@
+//! Laws of packings, judged by closed forms and brute force.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails says where")]
+
+mod brute_force;
+mod overlaps;
+mod packings;
+mod populations;
+mod refusals;
+mod sections;

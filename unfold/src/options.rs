@@ -32,8 +32,16 @@ impl Method {
 
 /// A parametric bootstrap: counts are drawn again from the fit (Poisson) and unfolded again; percentiles of the results are the interval.
 ///
-/// Such intervals are too short: each refit is biased as the fit was. A nominal 90 % covers the true total about 85 % of the time and single
-/// bins less, down to half where the fit put nothing. Read them as the spread of the estimator, not as proof.
+/// Not bias-corrected: clamping negative densities, or holding them at zero, moves every refit as it moved the fit, and the intervals with it.
+/// Measured on the paper's figure 7 (four distributions, 200 fits, ten bins, integrated kernel), nominal 90 % covered:
+///
+/// | | total | mean size | volume fraction | bins |
+/// |---|---|---|---|---|
+/// | [`Method::Paper`] | .59 | .68 | .90 | .89 |
+/// | [`Method::Nnls`] | .82 | .80 | .91 | .89 |
+/// | [`Method::Em`] | .89 | .93 | .92 | .89 |
+///
+/// With an upper-edge kernel where sizes spread over the bins, or fewer profiles, expect less.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bootstrap {
     /// How many times counts are drawn again.

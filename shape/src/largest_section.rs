@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Rotation3, UnitVector3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3, Vector3};
 
 use crate::closed_mesh::ClosedMesh;
 use crate::measures::double_area;
@@ -20,13 +20,15 @@ pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
     starts.sort_by(|a, b| b.area.total_cmp(&a.area));
     let mut best = 0.0_f64;
     for start in distinct(&starts, search.budget.climbs) {
-        let mut top = search.climb(start, search.budget.step);
-        for _ in 0..3 {
+        let mut top = search.climb(start, search.budget.step, best);
+        // A summit clearly below another is not worth its last digits.
+        let rounds = if top.area > 0.999 * best { 3 } else { 0 };
+        for _ in 0..rounds {
             let snapped = search.snap(&top);
             if snapped.area <= top.area * (1.0 + 1e-12) {
                 break;
             }
-            top = search.climb(snapped, 1e-3);
+            top = search.climb(snapped, 1e-3, best);
         }
         best = best.max(top.area);
     }
@@ -41,13 +43,44 @@ struct Cut {
     area: f64,
 }
 
+impl Cut {
+    fn larger(self, other: &Self) -> Self {
+        if other.area > self.area { *other } else { self }
+    }
+}
+
 /// How much to look: small meshes are cheap and have many near ties, large ones are smooth.
 struct Budget {
     directions: u32,
     depths: usize,
     climbs: usize,
-    /// First poll of a climb, in radians and in units of the body's reach.
+    /// First poll of a climb, in radians and in units of the body's reach; and the last.
     step: f64,
+    finest: f64,
+}
+
+/// Where a climb looks, in steps: what second differences need.
+const POLLS: [[f64; 3]; 9] = [
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 1.0],
+    [1.0, 0.0, 1.0],
+];
+
+/// Summit of the parabola through the centre and the polls, in steps, and how much higher it is; `None` if it has none.
+fn summit(centre: f64, polls: &[f64; 9]) -> Option<(Vector3<f64>, f64)> {
+    let p = |k: usize| polls[k] - centre;
+    let gradient = Vector3::new(p(0) - p(1), p(2) - p(3), p(4) - p(5)) * 0.5;
+    let (xx, yy, zz) = (p(0) + p(1), p(2) + p(3), p(4) + p(5));
+    let (xy, yz, zx) = (p(6) - p(0) - p(2), p(7) - p(2) - p(4), p(8) - p(0) - p(4));
+    let hessian = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
+    let place = (-hessian).cholesky()?.solve(&gradient);
+    Some((place, 0.5 * gradient.dot(&place)))
 }
 
 struct Search<'a> {
@@ -59,25 +92,17 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(mesh: &'a ClosedMesh) -> Self {
-        let budget = match mesh.triangles().len() {
-            0..=200 => Budget {
-                directions: 800,
-                depths: 24,
-                climbs: 16,
-                step: 0.05,
-            },
-            201..=5000 => Budget {
-                directions: 400,
-                depths: 32,
-                climbs: 8,
-                step: 0.08,
-            },
-            _ => Budget {
-                directions: 160,
-                depths: 32,
-                climbs: 3,
-                step: 0.12,
-            },
+        let (directions, depths, climbs, step, finest) = match mesh.triangles().len() {
+            0..=200 => (800, 16, 8, 0.06, 1e-7),
+            201..=5000 => (600, 32, 12, 0.08, 1e-7),
+            _ => (160, 32, 6, 0.12, 1e-6),
+        };
+        let budget = Budget {
+            directions,
+            depths,
+            climbs,
+            step,
+            finest,
         };
         Self {
             mesh,
@@ -97,6 +122,15 @@ impl<'a> Search<'a> {
     fn best_depth(&mut self, normal: UnitVector3<f64>) -> Cut {
         self.slicer.turn_to(&normal);
         let (low, high) = self.mesh.extent(&normal);
+        if self.mesh.is_convex() {
+            // √A is concave in depth (Brunn and Minkowski): one summit.
+            let at = |offset: f64| Cut {
+                normal,
+                offset,
+                area: self.slicer.total_area(offset),
+            };
+            return highest(low, high, 1e-3 * (high - low), at);
+        }
         let margin = 1e-9 * self.reach;
         let steps = self.budget.depths;
         let mut offsets: Vec<f64> = (0..=steps)
@@ -143,53 +177,59 @@ impl<'a> Search<'a> {
         Cut { normal, offset, area }
     }
 
-    /// Polls planes around the best one so far, turned and shifted by `step`; halves the step where none is better.
-    fn climb(&mut self, start: Cut, step: f64) -> Cut {
+    /// Polls planes around the best one so far, turned and shifted by `step`, and the summit of the parabola through the polls; halves
+    /// the step where none is better. Gives up a summit that will stay below `to_beat`.
+    fn climb(&mut self, start: Cut, step: f64, to_beat: f64) -> Cut {
         let mut best = start;
         let mut step = step;
         let mut turn = 0.0_f64;
-        while step > 1e-8 {
-            let mut improved = false;
-            for poll in 0..10 {
-                let tried = self.poll(&best, step, turn, poll);
-                if tried.area > best.area {
-                    improved = true;
-                    best = tried;
-                }
-            }
-            // Fresh directions each round: on the ridges of polyhedra fixed ones get stuck.
+        let mut failures = 0;
+        while step > self.budget.finest && !(step < 2e-3 && best.area < 0.99 * to_beat) {
+            let centre = best;
+            // Fresh axes each round: on the ridges of polyhedra fixed ones get stuck.
             turn += 2.4;
-            if !improved {
+            let polls = POLLS.map(|[x, y, z]| self.near(&centre, turn, [x * step, y * step, z * step]));
+            for tried in &polls {
+                best = best.larger(tried);
+            }
+            let summit = summit(centre.area, &polls.map(|cut| cut.area));
+            let mut gain = f64::INFINITY;
+            if let Some((place, expected)) = summit {
+                gain = expected;
+                let shorten = 4.0_f64.min(place.norm()) / place.norm().max(f64::MIN_POSITIVE) * step;
+                best = best.larger(&self.near(&centre, turn, (place * shorten).into()));
+            }
+            if best.area > centre.area {
+                failures = 0;
+                continue;
+            }
+            failures += 1;
+            // Where profiles merge and part the area jumps: wide steps get several tries, fine ones end on a smooth summit.
+            if step < 0.01 && gain < 1e-13 * best.area {
+                break;
+            }
+            if step < 0.01 || failures == 3 {
+                failures = 0;
                 step *= 0.5;
             }
         }
         best
     }
 
-    fn poll(&mut self, from: &Cut, step: f64, turn: f64, poll: u32) -> Cut {
+    /// The cut of a plane near `from`: turned by x and y about two axes in it, which `turn` turns, and shifted by z times the reach.
+    fn near(&mut self, from: &Cut, turn: f64, [x, y, z]: [f64; 3]) -> Cut {
         let [u, v] = crate::section::plane_basis(&from.normal);
-        let pivot = self.mesh.centroid();
-        // The depth is kept at the centroid, so turning and shifting are apart.
-        let depth = from.offset - pivot.coords.dot(&from.normal);
-        let (tilt, shift) = match poll {
-            0 => (None, 1.0),
-            1 => (None, -1.0),
-            _ => (
-                Some(turn + PI * f64::from(poll) / 4.0),
-                [0.0, 0.7, -0.7][poll as usize % 3],
-            ),
-        };
-        let normal = match tilt {
-            None => from.normal,
-            Some(angle) => {
-                UnitVector3::new_normalize(from.normal.into_inner() + step * (u * angle.cos() + v * angle.sin()))
-            }
-        };
-        let offset = depth + shift * step * self.reach + pivot.coords.dot(&normal);
+        let (sin, cos) = turn.sin_cos();
+        let (u, v) = (u * cos + v * sin, v * cos - u * sin);
+        let pivot = self.mesh.centroid().coords;
+        let normal = UnitVector3::new_normalize(from.normal.into_inner() + u * x + v * y);
+        // The distance from the centroid is kept, so turning and shifting are apart.
+        let offset = from.offset + pivot.dot(&(normal.into_inner() - from.normal.into_inner())) + z * self.reach;
         self.cut(normal, offset)
     }
 
-    /// The best plane through three of the vertices nearest to the given one.
+    /// The best plane near the given one through two or three of the vertices it passes closely: an edge in the plane makes a ridge
+    /// of the area that polls cannot follow.
     fn snap(&mut self, near: &Cut) -> Cut {
         let mut close: Vec<(f64, usize)> = Vec::new();
         for (i, v) in self.mesh.vertices().iter().enumerate() {
@@ -200,28 +240,64 @@ impl<'a> Search<'a> {
         }
         close.sort_by(|a, b| a.0.total_cmp(&b.0));
         close.truncate(8);
+        let close: Vec<Point3<f64>> = close.into_iter().map(|(_, i)| self.mesh.vertices()[i]).collect();
         let mut best = *near;
-        for a in 0..close.len() {
-            for b in a + 1..close.len() {
-                for c in b + 1..close.len() {
-                    let [p, q, r] = [a, b, c].map(|k| self.mesh.vertices()[close[k].1]);
-                    let Some(normal) = UnitVector3::try_new(double_area(&[p, q, r]), 1e-12 * self.reach * self.reach)
-                    else {
-                        continue;
-                    };
-                    let offset = normal.dot(&((p.coords + q.coords + r.coords) / 3.0));
-                    // A face may lie in the plane: try it from both sides.
-                    for side in [-1e-11, 1e-11] {
-                        let tried = self.cut(normal, offset + side * self.reach);
-                        if tried.area > best.area {
-                            best = tried;
-                        }
-                    }
+        for (i, p) in close.iter().enumerate() {
+            for (j, q) in close.iter().enumerate().skip(i + 1) {
+                if self.mesh.triangles().len() <= 5000 {
+                    best = best.larger(&self.best_about_line(near, p, q));
+                }
+                for r in &close[j + 1..] {
+                    best = best.larger(&self.through(&[*p, *q, *r]));
                 }
             }
         }
         best
     }
+
+    /// The plane through three points, a hair to the better side (a face may lie in it); of no area if they lie on a line.
+    fn through(&mut self, points: &[Point3<f64>; 3]) -> Cut {
+        let Some(normal) = UnitVector3::try_new(double_area(points), 1e-12 * self.reach * self.reach) else {
+            return Cut {
+                normal: Vector3::z_axis(),
+                offset: 0.0,
+                area: 0.0,
+            };
+        };
+        let offset = normal.dot(&points[0].coords);
+        let side = 1e-11 * self.reach;
+        self.cut(normal, offset - side).larger(&self.cut(normal, offset + side))
+    }
+
+    /// The best of the planes through p and q that are turned at most 0.03 from `near`, by golden sections.
+    fn best_about_line(&mut self, near: &Cut, p: &Point3<f64>, q: &Point3<f64>) -> Cut {
+        let line = (q - p).normalize();
+        let start = near.normal.into_inner() - line * line.dot(&near.normal);
+        let aside = line.cross(&start);
+        highest(-0.03, 0.03, 1e-9, |angle| {
+            let normal = UnitVector3::new_normalize(start + aside * angle);
+            self.cut(normal, normal.dot(&p.coords))
+        })
+    }
+}
+
+/// The largest of the cuts between `low` and `high` if they have one summit, to `width`, by golden sections.
+fn highest(mut low: f64, mut high: f64, width: f64, mut at: impl FnMut(f64) -> Cut) -> Cut {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let mut inner = [high - golden * (high - low), low + golden * (high - low)];
+    let mut cuts = inner.map(&mut at);
+    while high - low > width {
+        if cuts[0].area > cuts[1].area {
+            high = inner[1];
+            inner = [high - golden * (high - low), inner[0]];
+            cuts = [at(inner[0]), cuts[0]];
+        } else {
+            low = inner[0];
+            inner = [inner[1], low + golden * (high - low)];
+            cuts = [cuts[1], at(inner[1])];
+        }
+    }
+    cuts[0].larger(&cuts[1])
 }
 
 fn largest(profiles: Vec<crate::section::FlatProfile>) -> f64 {

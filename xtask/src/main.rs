@@ -1,5 +1,6 @@
 //! `cargo xtask`: the work on the workspace that is not the program itself.
 
+mod sample;
 mod tidy;
 
 use std::path::Path;
@@ -20,6 +21,8 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
+    /// Makes the built-in sample and its truth anew
+    Sample,
     /// Runs all that has to pass before a change lands
     Ci,
 }
@@ -27,17 +30,21 @@ enum Task {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
+        Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),
     }
 }
 
-fn ci() -> Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+fn root() -> Result<&'static Path> {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
-        .context("xtask stands inside the workspace")?;
+        .context("xtask stands inside the workspace")
+}
+
+fn ci() -> Result<()> {
     let status = Command::new("bash")
         .arg(".ci/run")
-        .current_dir(root)
+        .current_dir(root()?)
         .status()
         .context("bash cannot be run")?;
     ensure!(status.success(), ".ci/run failed");

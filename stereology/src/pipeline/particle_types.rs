@@ -1,7 +1,7 @@
 //! The types of particle a material is made of: their bodies, their shares, and the kernel they have together.
 
-use stereology_kmatrix::{EdgesError, SectionLaw, Sizes};
-use stereology_shape::{Body, BodyError, BodyKind, UnitBody};
+use stereology_kmatrix::{EdgesError, SectionLaw, SectionOptions, Sizes};
+use stereology_shape::{Body, BodyError, UnitBody};
 use stereology_unfold::{Kernel, KernelError, SizeBins};
 
 /// One type of particle.
@@ -180,18 +180,10 @@ impl ParticleType {
 
 /// Closed for spheres and ellipsoids; for meshes sections are integrated until the kernel is known to [`LAW_TOLERANCE`].
 fn section_law(name: &str, body: &Body) -> Result<SectionLaw, ParticleTypesError> {
-    let law = match body.kind() {
-        BodyKind::Sphere { diameter } => SectionLaw::sphere(diameter),
-        BodyKind::Ellipsoid { semi_axes } => SectionLaw::ellipsoid(semi_axes),
-        _ => {
-            return Err(ParticleTypesError::Law {
-                name: name.to_owned(),
-                why: "section laws of meshes are not available yet".to_owned(),
-            });
+    SectionLaw::of_body(body, &SectionOptions::default().with_tolerance(LAW_TOLERANCE)).map_err(|error| {
+        ParticleTypesError::Law {
+            name: name.to_owned(),
+            why: error.to_string(),
         }
-    };
-    law.map_err(|error| ParticleTypesError::Law {
-        name: name.to_owned(),
-        why: error.to_string(),
     })
 }

@@ -193,7 +193,7 @@ impl Body {
         ))?))
     }
 
-    /// A convex rock of 18 to 38 faces, about one unit across; the same body for the same seed.
+    /// A convex rock of 16 to 38 faces, about one unit across; the same body for the same seed.
     ///
     /// ```
     /// # use stereology_shape::Body;

@@ -8,9 +8,9 @@ use rand_distr::{Distribution, UnitSphere};
 use crate::closed_mesh::ClosedMesh;
 use crate::hull::convex_hull;
 
-/// A convex rock of 16 to 40 triangular faces, about one unit across; the same mesh for the same seed.
+/// A convex rock of 16 to 38 triangular faces, about one unit across; the same mesh for the same seed.
 ///
-/// Hull of 11 to 21 points spread over an ellipsoid of random proportions (1 : 0.65–0.95 : 0.45–0.85) and pulled in at random, so faces
+/// Hull of 11 to 21 points spread over an ellipsoid of random proportions (1 : 0.7–0.95 : 0.5–0.85) and pulled in at random, so faces
 /// differ in size as those of crushed stone do.
 pub(crate) fn rock(seed: u64) -> ClosedMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -27,8 +27,8 @@ pub(crate) fn rock(seed: u64) -> ClosedMesh {
 fn chip(rng: &mut impl Rng) -> Vec<Point3<f64>> {
     let axes = Vector3::new(
         0.5,
-        0.5 * rng.random_range(0.65..0.95),
-        0.5 * rng.random_range(0.45..0.85),
+        0.5 * rng.random_range(0.7..0.95),
+        0.5 * rng.random_range(0.5..0.85),
     );
     let mut directions: Vec<Vector3<f64>> = Vec::new();
     for _ in 0..rng.random_range(11..=21_u32) {
@@ -40,10 +40,10 @@ fn chip(rng: &mut impl Rng) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// Of three random directions the one farthest from those taken: spread, but not evenly.
+/// Of five random directions the one farthest from those taken: spread, but not evenly.
 fn far_direction(rng: &mut impl Rng, taken: &[Vector3<f64>]) -> Vector3<f64> {
     let mut best = (f64::NEG_INFINITY, Vector3::z());
-    for _ in 0..3 {
+    for _ in 0..5 {
         let direction = Vector3::from(UnitSphere.sample(rng));
         let gap = taken
             .iter()

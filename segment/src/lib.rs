@@ -1,1 +1,82 @@
 //! Profiles of particles from a photograph of a section: binder, labels, colours, residual.
+//!
+//! A cut stone shows particles in a binder. Unfolding needs the size of each cut particle, its profile; the solid texture needs its colour, and what is left when the mean colours are taken away.
+//!
+//! ```text
+//! photo → Lab, smoothed → binder b(x, y), scatter Σ → z = √((p − b)ᵀ Σ⁻¹ (p − b)) → hysteresis at z = 5 / 9
+//!       → outlines at half contrast: (p − b)·(c − b) ≥ ½ |c − b|²  → touching particles apart: by colour, then by shape
+//! photo / 255 = means + residual
+//! ```
+//!
+//! The binder is found, not given: it is the colour that most pixels share for how little it scatters, under light that may change across the photo as a quadratic surface. Particles may be lighter and darker
+//! than it at once, which no single threshold of grey levels can separate. Half contrast keeps areas unbiased: outlines at the threshold itself would make every profile about a fifth too large.
+//!
+//! # A photo of discs
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//! use stereology_segment::{SegmentOptions, segment};
+//!
+//! // Nine dark discs of radius 12 on a pale ground with a little texture.
+//! let photo = image::RgbImage::from_fn(150, 150, |x, y| {
+//!     let from_centre = |v: u32| f64::from(v % 50) - 24.5;
+//!     let inside = from_centre(x).hypot(from_centre(y)) < 12.0;
+//!     let texture = (x * 7919 + y * 104_729) % 5;
+//!     image::Rgb([if inside { 60 } else { 200 } + texture as u8; 3])
+//! });
+//! let segmentation = segment(&photo, &SegmentOptions::default(), &|_| ControlFlow::Continue(()))?;
+//! assert_eq!(segmentation.profiles.len(), 9);
+//! assert!(segmentation.profiles.iter().all(|p| (p.size - 24.0).abs() < 0.5));
+//! # Ok::<(), stereology_segment::SegmentError>(())
+//! ```
+//!
+//! # Labels of another tool
+//!
+//! ```
+//! use stereology_segment::{EdgeRule, SegmentOptions, Segmentation};
+//!
+//! let photo = image::RgbImage::from_fn(30, 30, |x, y| image::Rgb([x as u8, y as u8, 0]));
+//! let labels = ndarray::Array2::from_shape_fn((30, 30), |(y, x)| u32::from(y > 10 && x > 10));
+//! let options = SegmentOptions::default().with_edge_rule(EdgeRule::All);
+//! let segmentation = Segmentation::from_labels(&photo, labels, &options)?;
+//! assert_eq!(segmentation.profiles[0].area, 361.0);
+//! # Ok::<(), stereology_segment::SegmentError>(())
+//! ```
+
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "pictures in memory have fewer than 2^32 pixels; colours and distances are rounded to f32 and to 8 bits on purpose"
+)]
+
+mod binder;
+mod category;
+mod error;
+mod finding;
+mod kmeans;
+mod lab;
+mod label_map;
+mod options;
+mod photo;
+mod pictures;
+mod profile;
+mod refine;
+mod regions;
+mod segmentation;
+mod split;
+mod watershed;
+
+pub use binder::BinderModel;
+pub use category::{Category, categorise};
+pub use error::SegmentError;
+pub use finding::Finding;
+pub use kmeans::{Clusters, kmeans, silhouette};
+pub use lab::{lab, lab_image, smooth};
+pub use label_map::{read_labels, write_labels};
+pub use options::{EdgeRule, Holes, SegmentOptions};
+pub use photo::read_photo;
+pub use profile::{Profile, Window};
+pub use refine::{core_colours, half_contrast};
+pub use regions::{connected_pieces, fill_holes, hysteresis, open};
+pub use segmentation::{Binder, Segmentation, segment};
+pub use split::{split_by_colour, split_by_shape};
+pub use watershed::{distance_transform, h_maxima, smooth_field, watershed};

@@ -1,0 +1,299 @@
+//! The binder: the colour everything else is told apart from, under light that is not even.
+
+use ndarray::{Array2, Axis};
+use rayon::prelude::*;
+
+use crate::kmeans::kmeans;
+
+/// Terms of a quadratic surface.
+const TERMS: usize = 6;
+
+/// Robust fit of the binder's colour: a quadratic surface of light in each Lab channel, and the scatter around it.
+///
+/// # Formula
+///
+/// ```text
+/// b(x, y) = c₀ + c₁u + c₂v + c₃u² + c₄uv + c₅v²,    u, v in −1..1 across the photo
+/// z(p) = √((p − b)ᵀ Σ⁻¹ (p − b))
+/// ```
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, section 4.2 segments by hand; the trimmed covariance is that of Rousseeuw's reweighting (1987).
+#[derive(Clone, Debug, PartialEq)]
+pub struct BinderModel {
+    surface: [[f64; TERMS]; 3],
+    /// Lower triangular W with Σ⁻¹ = WᵀW.
+    whitening: [[f64; 3]; 3],
+    size: (usize, usize),
+    share: f64,
+}
+
+/// A pixel of the sample: place in −1..1 and colour.
+#[derive(Clone, Copy)]
+struct Sample {
+    place: [f64; 2],
+    colour: [f64; 3],
+}
+
+/// Pixels in the sample, at least, where the photo has as many.
+const SAMPLE: usize = 16_000;
+/// Distance beyond which a pixel does not count as binder while fitting.
+const GATE: f64 = 3.0;
+/// Variance that a three-dimensional Gaussian loses when it is cut at [`GATE`]: P(χ²₅ < 9) / P(χ²₃ < 9).
+const TRIMMED: f64 = 0.9178;
+/// Least standard deviation in Lab: a grey level of an 8-bit picture, smoothed.
+const LEAST_DEVIATION: f64 = 0.25;
+
+impl BinderModel {
+    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken. `colour`, in Lab, makes it the only guess.
+    ///
+    /// # Complexity
+    ///
+    /// A sample of 16,000 pixels is looked at, whatever the size of the photo.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{BinderModel, lab_image};
+    ///
+    /// // A grey binder, lit from the left, with a white square in it.
+    /// let photo = image::RgbImage::from_fn(64, 64, |x, y| {
+    ///     let level = if (20..30).contains(&x) && (20..30).contains(&y) { 250 } else { 100 + x as u8 / 2 + (x * 7 + y * 5) as u8 % 3 };
+    ///     image::Rgb([level; 3])
+    /// });
+    /// let lab = lab_image(&photo);
+    /// let binder = BinderModel::fit(&lab, None, 0);
+    /// let distance = binder.distance(&lab);
+    /// assert!(distance[[25, 25]] > 20.0 && distance[[50, 5]] < 4.0 && distance[[50, 60]] < 4.0);
+    /// ```
+    #[must_use]
+    pub fn fit(lab: &Array2<[f32; 3]>, colour: Option<[f32; 3]>, seed: u64) -> Self {
+        let samples = sample(lab);
+        let colours: Vec<[f64; 3]> = samples.iter().map(|s| s.colour).collect();
+        let guesses = match colour {
+            Some(c) => vec![c.map(f64::from)],
+            None => kmeans(&colours, 8, seed).centres,
+        };
+        let fits: Vec<(f64, Self)> = guesses
+            .par_iter()
+            .map(|guess| {
+                let model = Self::from_guess(&samples, *guess, lab.dim());
+                (model.share / model.spread().max(1.0).powf(0.7), model)
+            })
+            .collect();
+        let mut best = Self {
+            surface: [[0.0; TERMS]; 3],
+            whitening: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            size: lab.dim(),
+            share: 0.0,
+        };
+        let mut best_score = f64::NEG_INFINITY;
+        for (score, model) in fits {
+            if score > best_score {
+                (best_score, best) = (score, model);
+            }
+        }
+        best
+    }
+
+    fn from_guess(samples: &[Sample], guess: [f64; 3], size: (usize, usize)) -> Self {
+        // Start wide around the guess; each round fits what the last round calls binder.
+        let mut model = Self {
+            surface: guess.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            whitening: identity(1.0 / 4.0),
+            size,
+            share: 0.0,
+        };
+        for (round, terms) in [1, 1, 3, 3, TERMS, TERMS, TERMS, TERMS].into_iter().enumerate() {
+            let gate = if round < 2 { 2.0 } else { GATE };
+            let inside: Vec<&Sample> = samples
+                .iter()
+                .filter(|s| model.squared(s.place, s.colour) < gate * gate)
+                .collect();
+            if inside.len() < 50 {
+                break;
+            }
+            model.surface = fit_surface(&inside, terms);
+            model.share = inside.len() as f64 / samples.len() as f64;
+            model.whitening = scatter(&model, &inside);
+        }
+        model
+    }
+
+    /// Lab colour of the binder at a pixel, light included.
+    #[must_use]
+    pub fn light(&self, x: usize, y: usize) -> [f32; 3] {
+        self.at(self.place(x, y)).map(|c| c as f32)
+    }
+
+    /// Share of the photo's pixels that are binder, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Geometric mean of the standard deviations of the binder's colour in Lab.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        (self.whitening[0][0] * self.whitening[1][1] * self.whitening[2][2]).powf(-1.0 / 3.0)
+    }
+
+    /// Difference of every pixel to the binder there, in units of the binder's scatter: a vector whose length is the robust distance z.
+    #[must_use]
+    pub fn deviation(&self, lab: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
+        let mut out = lab.clone();
+        let w = self.whitening.map(|row| row.map(|v| v as f32));
+        out.axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(y, mut row)| {
+                for (x, p) in row.iter_mut().enumerate() {
+                    let b = self.light(x, y);
+                    let d = [p[0] - b[0], p[1] - b[1], p[2] - b[2]];
+                    *p = [
+                        w[0][0] * d[0],
+                        w[1][0] * d[0] + w[1][1] * d[1],
+                        w[2][0] * d[0] + w[2][1] * d[1] + w[2][2] * d[2],
+                    ];
+                }
+            });
+        out
+    }
+
+    /// Robust distance z of every pixel to the binder, in standard deviations.
+    ///
+    /// # Complexity
+    ///
+    /// Linear in pixels.
+    ///
+    /// # Examples
+    ///
+    /// See [`BinderModel::fit`].
+    #[must_use]
+    pub fn distance(&self, lab: &Array2<[f32; 3]>) -> Array2<f32> {
+        self.deviation(lab).mapv(length)
+    }
+
+    fn place(&self, x: usize, y: usize) -> [f64; 2] {
+        place(x, y, self.size)
+    }
+
+    fn at(&self, p: [f64; 2]) -> [f64; 3] {
+        let basis = basis(p);
+        self.surface.map(|c| c.iter().zip(basis).map(|(c, b)| c * b).sum())
+    }
+
+    fn squared(&self, place: [f64; 2], colour: [f64; 3]) -> f64 {
+        let b = self.at(place);
+        let d = [colour[0] - b[0], colour[1] - b[1], colour[2] - b[2]];
+        self.whitening
+            .iter()
+            .map(|w| (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]).powi(2))
+            .sum()
+    }
+}
+
+/// Euclidean length.
+pub(crate) fn length(v: [f32; 3]) -> f32 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+fn identity(scale: f64) -> [[f64; 3]; 3] {
+    [[scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, 0.0, scale]]
+}
+
+fn place(x: usize, y: usize, (height, width): (usize, usize)) -> [f64; 2] {
+    [
+        (2 * x + 1) as f64 / width as f64 - 1.0,
+        (2 * y + 1) as f64 / height as f64 - 1.0,
+    ]
+}
+
+fn basis([u, v]: [f64; 2]) -> [f64; TERMS] {
+    [1.0, u, v, u * u, u * v, v * v]
+}
+
+/// Pixels on a square lattice.
+fn sample(lab: &Array2<[f32; 3]>) -> Vec<Sample> {
+    let (height, width) = lab.dim();
+    let step = ((height * width / SAMPLE) as f64).sqrt().floor().max(1.0) as usize;
+    let at = |n: usize| (step / 2..n).step_by(step);
+    at(height)
+        .flat_map(|y| at(width).map(move |x| (x, y)))
+        .map(|(x, y)| Sample {
+            place: place(x, y, (height, width)),
+            colour: lab[[y, x]].map(f64::from),
+        })
+        .collect()
+}
+
+/// Least squares with a little shrinkage of slopes and curvatures, so that a binder seen in one corner is not extrapolated wildly.
+fn fit_surface(inside: &[&Sample], terms: usize) -> [[f64; TERMS]; 3] {
+    let mut normal = [[0.0; TERMS]; TERMS];
+    let mut right = [[0.0; TERMS]; 3];
+    for s in inside {
+        let b = basis(s.place);
+        for i in 0..terms {
+            for j in 0..=i {
+                normal[i][j] += b[i] * b[j];
+            }
+            for c in 0..3 {
+                right[c][i] += b[i] * s.colour[c];
+            }
+        }
+    }
+    let shrinkage = 1e-3 * inside.len() as f64;
+    (1..terms).for_each(|i| normal[i][i] += shrinkage);
+    // Cholesky: the matrix is positive definite (at least 50 samples, shrinkage).
+    for i in 0..terms {
+        for j in 0..=i {
+            let inner: f64 = (0..j).map(|k| normal[i][k] * normal[j][k]).sum();
+            let rest = normal[i][j] - inner;
+            normal[i][j] = if i == j {
+                rest.max(1e-12).sqrt()
+            } else {
+                rest / normal[j][j]
+            };
+        }
+    }
+    right.map(|mut r| {
+        for i in 0..terms {
+            let inner: f64 = (0..i).map(|k| normal[i][k] * r[k]).sum();
+            r[i] = (r[i] - inner) / normal[i][i];
+        }
+        for i in (0..terms).rev() {
+            let inner: f64 = (i + 1..terms).map(|k| normal[k][i] * r[k]).sum();
+            r[i] = (r[i] - inner) / normal[i][i];
+        }
+        r
+    })
+}
+
+/// Inverse Cholesky factor of the covariance around the surface, made up for the trimming and kept above the quantisation.
+fn scatter(model: &BinderModel, inside: &[&Sample]) -> [[f64; 3]; 3] {
+    let mut cov = [[0.0; 3]; 3];
+    for s in inside {
+        let b = model.at(s.place);
+        let d = [s.colour[0] - b[0], s.colour[1] - b[1], s.colour[2] - b[2]];
+        for i in 0..3 {
+            for j in 0..=i {
+                cov[i][j] += d[i] * d[j];
+            }
+        }
+    }
+    let scale = 1.0 / (TRIMMED * inside.len() as f64);
+    cov.iter_mut().flatten().for_each(|v| *v *= scale);
+    (0..3).for_each(|i| cov[i][i] += LEAST_DEVIATION * LEAST_DEVIATION);
+    let l00 = cov[0][0].sqrt();
+    let (l10, l20) = (cov[1][0] / l00, cov[2][0] / l00);
+    let l11 = (cov[1][1] - l10 * l10).max(1e-6).sqrt();
+    let l21 = (cov[2][1] - l20 * l10) / l11;
+    let l22 = (cov[2][2] - l20 * l20 - l21 * l21).max(1e-6).sqrt();
+    // Inverse of a lower triangle.
+    let (w00, w11, w22) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
+    let w10 = -l10 * w00 * w11;
+    let w21 = -l21 * w11 * w22;
+    let w20 = -(l20 * w00 + l21 * w10) * w22;
+    [[w00, 0.0, 0.0], [w10, w11, 0.0], [w20, w21, w22]]
+}

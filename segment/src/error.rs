@@ -1,0 +1,102 @@
+//! What can go wrong between a photograph and its profiles.
+
+use std::path::PathBuf;
+
+/// Why a photograph or a label map could not be read, segmented or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SegmentError {
+    /// The file cannot be opened.
+    #[error("{}: cannot be opened ({source}); check the path and the permissions", path.display())]
+    Open {
+        /// File as given.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file holds no bytes.
+    #[error("{}: the file is empty; give a PNG, JPEG or TIFF", path.display())]
+    EmptyFile {
+        /// File as given.
+        path: PathBuf,
+    },
+    /// The file is no picture of a known format, or is cut short.
+    #[error("{}: not a readable picture ({reason}); give a whole PNG, JPEG or TIFF", path.display())]
+    Decode {
+        /// File as given.
+        path: PathBuf,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// Too few pixels to hold particles and a binder.
+    #[error("the photo is {width} x {height} pixels; at least 16 x 16 are needed to tell particles from a binder")]
+    TooSmall {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Every pixel has the same colour.
+    #[error(
+        "the photo has a single colour, {colour:?}; there is nothing to separate: check that the right file was exported"
+    )]
+    SingleColour {
+        /// That colour.
+        colour: [u8; 3],
+    },
+    /// Nothing stands out from the binder.
+    #[error(
+        "no particle of at least {min_area} pixels stands out from the binder; give the binder's colour, lower the least area, or import a label map drawn by hand or by another tool"
+    )]
+    NoParticles {
+        /// Least area asked for, pixels.
+        min_area: usize,
+    },
+    /// The label map does not fit the photo.
+    #[error(
+        "the label map is {}x{} pixels, the photo {}x{}; export the labels at the photo's size, not turned or cropped",
+        labels[0], labels[1], photo[0], photo[1]
+    )]
+    LabelSize {
+        /// Width and height of the label map.
+        labels: [usize; 2],
+        /// Width and height of the photo.
+        photo: [usize; 2],
+    },
+    /// The label map has no label but 0.
+    #[error("the label map holds no profile: every pixel is 0, which is the binder")]
+    NoLabels,
+    /// The label map holds classes, not profiles.
+    #[error(
+        "the label map holds only the values 0, 1, 2 in {pieces} pieces: a mask of three classes (binder, inside, edge), not a number for each profile; export the label image instead (segmenteverygrain: \
+         the GeoJSON or the instance labels; ImageJ: Analyze Particles, Count Masks)"
+    )]
+    ClassMask {
+        /// Connected pieces of the values 1 and 2.
+        pieces: usize,
+    },
+    /// The label file's samples are no whole numbers of one channel.
+    #[error("{}: {reason}; give one channel of whole numbers, 0 for the binder (u8, u16, u32 or i32 TIFF, u8 or u16 PNG)", path.display())]
+    LabelFormat {
+        /// File as given.
+        path: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// An option is out of range.
+    #[error("{option} = {value}: {requirement}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// Value given.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] stereology_grid::GridError),
+    /// The progress function asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}

@@ -1,0 +1,16 @@
+//! What a researcher should know before trusting a segmentation.
+
+/// A remark on a segmentation; `code` is fixed, `message` says what was measured and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// `no-binder`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`, `clipped-labels`, `split-label`, `small-labels`.
+    pub code: &'static str,
+    /// For people.
+    pub message: String,
+}
+
+impl Finding {
+    pub(crate) fn new(code: &'static str, message: String) -> Self {
+        Self { code, message }
+    }
+}

@@ -1,0 +1,138 @@
+//! Pictures of a segmentation, and the residual that texture is made from.
+
+use std::path::Path;
+
+use image::{Rgb, RgbImage};
+use ndarray::{Array3, ArrayView3};
+use stereology_grid::write_atomically;
+use tiff::encoder::{TiffEncoder, colortype};
+
+use crate::{
+    error::SegmentError, label_map::dimensions, profile::Index, regions::neighbours4, segmentation::Segmentation,
+};
+
+/// Colours of the outlines of categories: Okabe & Ito's, which colour-blind readers can tell apart, black left out.
+const OUTLINES: [[u8; 3]; 8] = [
+    [230, 25, 75],
+    [0, 158, 255],
+    [0, 200, 60],
+    [240, 228, 66],
+    [204, 60, 220],
+    [230, 159, 0],
+    [0, 230, 220],
+    [255, 255, 255],
+];
+
+impl Segmentation {
+    /// The photo with a line one pixel wide just inside every profile, in the colour of its category.
+    #[must_use]
+    pub fn overlay(&self) -> RgbImage {
+        let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
+        let index = Index::new(&ids);
+        let mut out = self.photo.clone();
+        for ((y, x), &label) in self.labels.indexed_iter().filter(|(_, l)| **l != 0) {
+            if neighbours4([y, x], self.labels.dim()).any(|q| self.labels[q] != label) {
+                let category = usize::from(self.profiles[index.of(label)].category);
+                out.put_pixel(x as u32, y as u32, Rgb(OUTLINES[category % OUTLINES.len()]));
+            }
+        }
+        out
+    }
+
+    /// The photo's binder, its colour in place of the profiles.
+    #[must_use]
+    pub fn binder_picture(&self) -> RgbImage {
+        let colour = Rgb(encoded(self.binder.colour));
+        let mut out = self.photo.clone();
+        for (pixel, _) in out.pixels_mut().zip(&self.labels).filter(|(_, l)| **l != 0) {
+            *pixel = colour;
+        }
+        out
+    }
+
+    /// Every profile in its mean colour, the rest in the binder's, rounded to 8 bits.
+    #[must_use]
+    pub fn means(&self) -> RgbImage {
+        let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
+        let index = Index::new(&ids);
+        let colours: Vec<Rgb<u8>> = self.profiles.iter().map(|p| Rgb(encoded(p.colour))).collect();
+        let binder = Rgb(encoded(self.binder.colour));
+        let mut out = self.photo.clone();
+        for (pixel, &label) in out.pixels_mut().zip(&self.labels) {
+            *pixel = if label == 0 { binder } else { colours[index.of(label)] };
+        }
+        out
+    }
+
+    /// What [`means`](Self::means) leaves out: photo / 255 − means / 255, axes (y, x, channel), so that means and residual rebuild the photo exactly.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{SegmentOptions, Segmentation};
+    ///
+    /// let photo = image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([(x * y) as u8, x as u8, 90]));
+    /// let labels = ndarray::Array2::from_shape_fn((20, 20), |(y, _)| u32::from(y < 8));
+    /// let segmentation = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?;
+    /// let (means, residual) = (segmentation.means(), segmentation.residual());
+    /// for ((mean, residual), pixel) in means.iter().zip(&residual).zip(photo.iter()) {
+    ///     assert_eq!((f32::from(*mean) / 255.0 + residual) * 255.0, f32::from(*pixel));
+    /// }
+    /// # Ok::<(), stereology_segment::SegmentError>(())
+    /// ```
+    #[must_use]
+    pub fn residual(&self) -> Array3<f32> {
+        let means = self.means();
+        let mut out = Array3::zeros((self.window.height, self.window.width, 3));
+        for ((r, p), m) in out.iter_mut().zip(self.photo.iter()).zip(means.iter()) {
+            *r = (f32::from(*p) - f32::from(*m)) / 255.0;
+        }
+        out
+    }
+
+    /// The residual laid over the binder's colour: what the stone looks like with every particle dyed.
+    #[must_use]
+    pub fn residual_picture(&self) -> RgbImage {
+        let binder = encoded(self.binder.colour);
+        let mut out = self.means();
+        for (mean, pixel) in out.pixels_mut().zip(self.photo.pixels()) {
+            for c in 0..3 {
+                let level = i16::from(pixel[c]) - i16::from(mean[c]) + i16::from(binder[c]);
+                mean[c] = level.clamp(0, 255) as u8;
+            }
+        }
+        out
+    }
+
+    /// Writes the residual as a 32-bit float TIFF of three channels; the file appears whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written.
+    pub fn write_residual(&self, path: impl AsRef<Path>) -> Result<(), SegmentError> {
+        write_float_tiff(path, self.residual().view())
+    }
+
+    /// The photo that was segmented.
+    #[must_use]
+    pub fn photo(&self) -> &RgbImage {
+        &self.photo
+    }
+}
+
+/// Colour of encoded values 0 to 1, rounded to 8 bits.
+fn encoded(colour: [f64; 3]) -> [u8; 3] {
+    colour.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+fn write_float_tiff(path: impl AsRef<Path>, picture: ArrayView3<'_, f32>) -> Result<(), SegmentError> {
+    let (height, width, _) = picture.dim();
+    let (width, height) = dimensions((height, width));
+    let samples: Vec<f32> = picture.iter().copied().collect();
+    Ok(write_atomically(path, |out| {
+        let write = || -> tiff::TiffResult<()> {
+            TiffEncoder::new(out)?.write_image::<colortype::RGB32Float>(width, height, &samples)
+        };
+        write().map_err(std::io::Error::other)
+    })?)
+}

@@ -1,0 +1,189 @@
+//! Profiles: what a label map and a photo say of each particle cut.
+
+use image::RgbImage;
+use ndarray::Array2;
+
+use crate::options::EdgeRule;
+
+/// The trace of one particle on the section. Lengths in pixels, colours sRGB / 255.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// Its number in the label map.
+    pub id: u32,
+    /// Centre of area, pixels from the photo's left edge.
+    pub x: f64,
+    /// Centre of area, pixels from the photo's upper edge.
+    pub y: f64,
+    /// Area, pixels.
+    pub area: f64,
+    /// Diameter of the circle of that area, √(4 A / π).
+    pub size: f64,
+    /// Mean of the encoded values, 0 to 1.
+    pub colour: [f64; 3],
+    /// Colour category, from 0.
+    pub category: u8,
+    /// Whether the photo's edge cuts it.
+    pub touches_edge: bool,
+    /// What it counts for in the window's area: 1 or 0 by the counting frame.
+    pub weight: f64,
+    /// Left, upper, right, lower edge, pixels.
+    pub bounding_box: [usize; 4],
+}
+
+/// Where profiles are counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Width of the photo, pixels.
+    pub width: usize,
+    /// Height of the photo, pixels.
+    pub height: usize,
+    /// Area to which the weights belong, square pixels: that of the counting frame, or of the photo.
+    pub area: f64,
+}
+
+/// Profiles of a label map by increasing number; those of fewer than `min_area` pixels are left out. Category 0 and weight 1 for now.
+pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -> Vec<Profile> {
+    #[derive(Clone)]
+    struct Sums {
+        count: u64,
+        place: [u64; 2],
+        colour: [u64; 3],
+        bounds: [usize; 4],
+    }
+    let empty = Sums {
+        count: 0,
+        place: [0; 2],
+        colour: [0; 3],
+        bounds: [usize::MAX, usize::MAX, 0, 0],
+    };
+    let ids = distinct(labels);
+    let index = Index::new(&ids);
+    let mut sums = vec![empty; ids.len()];
+    for (((y, x), &label), pixel) in labels.indexed_iter().zip(photo.pixels()) {
+        if label == 0 {
+            continue;
+        }
+        let s = &mut sums[index.of(label)];
+        s.count += 1;
+        s.place[0] += x as u64;
+        s.place[1] += y as u64;
+        (0..3).for_each(|c| s.colour[c] += u64::from(pixel[c]));
+        s.bounds = [
+            s.bounds[0].min(x),
+            s.bounds[1].min(y),
+            s.bounds[2].max(x + 1),
+            s.bounds[3].max(y + 1),
+        ];
+    }
+    let (height, width) = labels.dim();
+    ids.into_iter()
+        .zip(sums)
+        .filter(|(_, s)| s.count >= min_area as u64)
+        .map(|(id, s)| {
+            let area = s.count as f64;
+            Profile {
+                id,
+                x: s.place[0] as f64 / area + 0.5,
+                y: s.place[1] as f64 / area + 0.5,
+                area,
+                size: size_of_area(area),
+                colour: s.colour.map(|c| c as f64 / (255.0 * area)),
+                category: 0,
+                touches_edge: s.bounds[0] == 0 || s.bounds[1] == 0 || s.bounds[2] == width || s.bounds[3] == height,
+                weight: 1.0,
+                bounding_box: s.bounds,
+            }
+        })
+        .collect()
+}
+
+/// Diameter of the circle of an area.
+pub(crate) fn size_of_area(area: f64) -> f64 {
+    (4.0 * area / std::f64::consts::PI).sqrt()
+}
+
+/// The labels in use, increasing, without 0.
+pub(crate) fn distinct(labels: &Array2<u32>) -> Vec<u32> {
+    let mut ids: Vec<u32> = Vec::new();
+    let mut last = 0;
+    for &l in labels {
+        if l != last && l != 0 {
+            ids.push(l);
+        }
+        last = l;
+    }
+    ids.sort_unstable();
+    ids.dedup();
+    ids
+}
+
+/// From a label to its place among the labels in use: a table while that is small, else a search.
+pub(crate) struct Index<'a> {
+    ids: &'a [u32],
+    table: Vec<u32>,
+}
+
+impl<'a> Index<'a> {
+    pub(crate) fn new(ids: &'a [u32]) -> Self {
+        let largest = ids.last().copied().unwrap_or(0) as usize;
+        let mut table = Vec::new();
+        if largest < 1 << 24 {
+            table = vec![0; largest + 1];
+            (0..).zip(ids).for_each(|(i, &id)| table[id as usize] = i);
+        }
+        Self { ids, table }
+    }
+
+    /// Place of a label that is in use.
+    pub(crate) fn of(&self, label: u32) -> usize {
+        match self.table.get(label as usize) {
+            Some(&i) => i as usize,
+            None => self.ids.partition_point(|&id| id < label),
+        }
+    }
+}
+
+/// Gives every profile its weight; the area they belong to, and whether the frame had to be cut short because profiles reach over more than half the photo.
+///
+/// # Formula
+///
+/// ```text
+/// frame:            1 if the upper left corner of the bounding box lies in [1, W − w) × [1, H − h), w and h the largest extents + 1;  area (W − 1 − w)(H − 1 − h)
+/// Miles-Lantuéjoul: W H / ((W − 1 − wᵢ)(H − 1 − hᵢ)) if whole, else 0;                                                           area W H
+/// ```
+///
+/// The corner moves with its profile, so a profile of any size or shape is counted with the probability that a point falls in the frame.
+pub(crate) fn weigh(profiles: &mut [Profile], (height, width): (usize, usize), rule: EdgeRule) -> (f64, bool) {
+    let photo = (width * height) as f64;
+    let extent = |p: &Profile, axis: usize| p.bounding_box[axis + 2] - p.bounding_box[axis];
+    match rule {
+        EdgeRule::All => {
+            profiles.iter_mut().for_each(|p| p.weight = 1.0);
+            (photo, false)
+        }
+        EdgeRule::MilesLantuejoul => {
+            for p in profiles {
+                let room = |full: usize, used: usize| full.saturating_sub(1 + used).max(1) as f64;
+                p.weight = if p.touches_edge {
+                    0.0
+                } else {
+                    photo / (room(width, extent(p, 0)) * room(height, extent(p, 1)))
+                };
+            }
+            (photo, false)
+        }
+        EdgeRule::Frame => {
+            // Whatever starts inside the frame must end inside the photo: cut profiles have to start beyond it.
+            let whole = |axis: usize| profiles.iter().map(|p| extent(p, axis) + 1).max().unwrap_or(0);
+            let (w, h) = (whole(0), whole(1));
+            let cut_short = w > width / 2 || h > height / 2;
+            let (right, lower) = (width - w.min(width / 2), height - h.min(height / 2));
+            for p in profiles {
+                let [x, y, ..] = p.bounding_box;
+                let counts = !p.touches_edge && (1..right).contains(&x) && (1..lower).contains(&y);
+                p.weight = f64::from(u8::from(counts));
+            }
+            (((right - 1) * (lower - 1)) as f64, cut_short)
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! From a photograph, or a photograph and a label map, to profiles.
+
+use std::ops::ControlFlow;
+
+use image::RgbImage;
+use ndarray::Array2;
+
+use crate::{
+    binder::{BinderModel, length},
+    category::{Category, categorise},
+    error::SegmentError,
+    finding::Finding,
+    lab::{lab, lab_image, smooth},
+    options::{EdgeRule, Holes, SegmentOptions},
+    profile::{Index, Profile, Window, measure, size_of_area, weigh},
+    refine::half_contrast,
+    regions::{connected_pieces, fill_holes, hysteresis, open},
+    split::{fill_label_holes, split_by_colour, split_by_shape},
+};
+
+/// What lies between the particles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Binder {
+    /// Mean of the encoded values of all pixels outside profiles, sRGB / 255.
+    pub colour: [f64; 3],
+}
+
+/// Profiles of a photo, their colours, and the binder. Lengths in pixels.
+#[derive(Clone, Debug)]
+pub struct Segmentation {
+    /// Profile of every pixel, axes (y, x): [`Profile::id`], or 0 for the binder.
+    pub labels: Array2<u32>,
+    /// By increasing id.
+    pub profiles: Vec<Profile>,
+    /// Colour categories, most profiles first.
+    pub categories: Vec<Category>,
+    /// The binder.
+    pub binder: Binder,
+    /// Where profiles are counted.
+    pub window: Window,
+    /// Share of the photo's area in profiles, cut ones included.
+    pub area_fraction: f64,
+    /// Sum of the weights over the window's area, per square pixel.
+    pub number_per_area: f64,
+    /// Size of the smallest profile looked for, the circle of [`SegmentOptions::min_area`]: the truncation to hand to unfolding.
+    pub min_size: f64,
+    /// What to know before trusting it.
+    pub findings: Vec<Finding>,
+    pub(crate) photo: RgbImage,
+}
+
+/// Where a segmentation stands, 0 to 1, and whether to go on.
+type Progress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
+
+/// Finds the profiles of particles in a photo of a section.
+///
+/// The steps, each a function of its own: [`lab_image`] and [`smooth`]; [`BinderModel`], whose colour and light are fitted robustly; [`hysteresis`] of the distance to it, [`fill_holes`], [`open`];
+/// [`half_contrast`]; [`split_by_colour`], [`split_by_shape`]; small profiles dropped, edges weighed, colours put in categories.
+///
+/// # Errors
+///
+/// A photo that is too small or of one colour, an option out of range, nothing that stands out, or cancelled. A photo without a binder is no error but the finding `no-binder`.
+///
+/// # Complexity
+///
+/// Linear in pixels but for the n log n of the watershed inside the mask.
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, sections 4.2 and 5.2.
+///
+/// # Examples
+///
+/// See the crate's first page.
+pub fn segment(
+    photo: &RgbImage,
+    options: &SegmentOptions,
+    progress: Progress<'_>,
+) -> Result<Segmentation, SegmentError> {
+    options.check()?;
+    let (width, height) = photo.dimensions();
+    if width < 16 || height < 16 {
+        return Err(SegmentError::TooSmall { width, height });
+    }
+    let first = *photo.get_pixel(0, 0);
+    if photo.pixels().all(|p| *p == first) {
+        return Err(SegmentError::SingleColour { colour: first.0 });
+    }
+    let report = |done| match progress(done) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(SegmentError::Cancelled),
+    };
+    report(0.0)?;
+    let colours = smooth(&lab_image(photo), options.smoothing);
+    report(0.15)?;
+    let binder = BinderModel::fit(&colours, options.binder.map(|c| lab(c.map(|v| v as f32))), options.seed);
+    report(0.3)?;
+    let deviation = binder.deviation(&colours);
+    let distance = deviation.mapv(length);
+    let [low, high] = options.thresholds;
+    let mut mask = hysteresis(&distance, low, high);
+    report(0.4)?;
+    let small_hole = |hole: usize, around: usize| hole <= options.min_area.max(around / 20);
+    if options.holes == Holes::Fill {
+        fill_holes(&mut mask, small_hole);
+    }
+    open(&mut mask);
+    let mut mask = half_contrast(&deviation, &mask);
+    if options.holes == Holes::Fill {
+        fill_holes(&mut mask, small_hole);
+    }
+    open(&mut mask);
+    report(0.6)?;
+    let parts = split_by_colour(&colours, &mask, options.seed);
+    report(0.75)?;
+    let mut labels = split_by_shape(&parts);
+    if options.holes == Holes::Fill {
+        fill_label_holes(&mut labels);
+    }
+    report(0.9)?;
+    let mut out = Segmentation::measured(photo, labels, options);
+    if out.profiles.is_empty() {
+        return Err(SegmentError::NoParticles {
+            min_area: options.min_area,
+        });
+    }
+    out.renumber();
+    out.judge_binder(&binder, &distance, options);
+    report(1.0)?;
+    Ok(out)
+}
+
+impl Segmentation {
+    /// Profiles of a label map drawn by hand or made by another tool, axes (y, x), 0 the binder. Numbers are kept; a label is one profile even if it is in pieces, which is the finding `split-label`.
+    ///
+    /// # Errors
+    ///
+    /// A map of another size than the photo, without labels, or of three classes instead of profiles; an option out of range.
+    ///
+    /// # Complexity
+    ///
+    /// Linear in pixels.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{EdgeRule, SegmentOptions, Segmentation};
+    ///
+    /// let photo = image::RgbImage::from_fn(40, 30, |x, _| image::Rgb([if x < 20 { 200 } else { 40 }; 3]));
+    /// let labels = ndarray::Array2::from_shape_fn((30, 40), |(y, x)| if (5..15).contains(&y) && (22..32).contains(&x) { 7 } else { 0 });
+    /// let segmentation = Segmentation::from_labels(&photo, labels, &SegmentOptions::default().with_edge_rule(EdgeRule::All))?;
+    /// let profile = &segmentation.profiles[0];
+    /// assert_eq!((profile.id, profile.area, profile.x, profile.y), (7, 100.0, 27.0, 10.0));
+    /// assert_eq!(profile.colour, [40.0 / 255.0; 3]);
+    /// # Ok::<(), stereology_segment::SegmentError>(())
+    /// ```
+    pub fn from_labels(photo: &RgbImage, labels: Array2<u32>, options: &SegmentOptions) -> Result<Self, SegmentError> {
+        options.check()?;
+        let (height, width) = labels.dim();
+        let size = [photo.width() as usize, photo.height() as usize];
+        if [width, height] != size {
+            return Err(SegmentError::LabelSize {
+                labels: [width, height],
+                photo: size,
+            });
+        }
+        let largest = labels.iter().copied().max().unwrap_or(0);
+        let (pieces, count) = connected_pieces(&labels, |l| l != 0);
+        if count == 0 {
+            return Err(SegmentError::NoLabels);
+        }
+        // Two profiles may well be labelled 1 and 2; a mask of classes has each in many pieces.
+        if largest == 2 && count > 6 {
+            return Err(SegmentError::ClassMask { pieces: count as usize });
+        }
+        let mut findings = Vec::new();
+        if largest == 255 || largest == 65_535 {
+            findings.push(Finding::new(
+                "clipped-labels",
+                format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles beyond merged into one; export it as 32-bit TIFF"),
+            ));
+        }
+        let in_pieces = labels_in_pieces(&labels, &pieces);
+        if let Some(first) = in_pieces.first() {
+            findings.push(Finding::new(
+                "split-label",
+                format!("{} labels are in more than one piece (the first is {first}); each is counted as one profile of their total area", in_pieces.len()),
+            ));
+        }
+        let given = crate::profile::distinct(&labels).len();
+        let mut out = Self::measured(photo, labels, options);
+        if out.profiles.is_empty() {
+            return Err(SegmentError::NoParticles {
+                min_area: options.min_area,
+            });
+        }
+        if out.profiles.len() < given {
+            findings.push(Finding::new(
+                "small-labels",
+                format!("{} of {given} labels have fewer than {} pixels and are left out; lower the least area to keep them", given - out.profiles.len(), options.min_area),
+            ));
+        }
+        findings.append(&mut out.findings);
+        out.findings = findings;
+        Ok(out)
+    }
+
+    /// Everything that follows from labels and photo; labels of small profiles become 0.
+    fn measured(photo: &RgbImage, mut labels: Array2<u32>, options: &SegmentOptions) -> Self {
+        let mut profiles = measure(photo, &labels, options.min_area);
+        let ids: Vec<u32> = profiles.iter().map(|p| p.id).collect();
+        labels.mapv_inplace(|l| if ids.binary_search(&l).is_ok() { l } else { 0 });
+        let (height, width) = labels.dim();
+        let (area, cut_short) = weigh(&mut profiles, (height, width), options.edge_rule);
+        let categories = categorise(&mut profiles, options.categories, options.seed);
+        let total: f64 = profiles.iter().map(|p| p.area).sum();
+        let mut sum = ([0_u64; 3], 0_u64);
+        for (_, pixel) in labels.iter().zip(photo.pixels()).filter(|(l, _)| **l == 0) {
+            (0..3).for_each(|c| sum.0[c] += u64::from(pixel[c]));
+            sum.1 += 1;
+        }
+        let mut out = Self {
+            binder: Binder {
+                colour: sum.0.map(|s| s as f64 / (255.0 * sum.1.max(1) as f64)),
+            },
+            window: Window { width, height, area },
+            area_fraction: total / (width * height) as f64,
+            number_per_area: profiles.iter().map(|p| p.weight).sum::<f64>() / area,
+            min_size: size_of_area(options.min_area as f64),
+            labels,
+            profiles,
+            categories,
+            findings: Vec::new(),
+            photo: photo.clone(),
+        };
+        out.judge_profiles(options, cut_short);
+        out
+    }
+
+    /// Numbers 1, 2, ... in reading order of the first pixels.
+    fn renumber(&mut self) {
+        let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
+        let index = Index::new(&ids);
+        let mut new = vec![0_u32; ids.len()];
+        let mut next = 1;
+        for l in self.labels.iter_mut().filter(|l| **l != 0) {
+            let number = &mut new[index.of(*l)];
+            if *number == 0 {
+                *number = next;
+                next += 1;
+            }
+            *l = *number;
+        }
+        for (p, id) in self.profiles.iter_mut().zip(new) {
+            p.id = id;
+        }
+        self.profiles.sort_by_key(|p| p.id);
+    }
+
+    fn judge_profiles(&mut self, options: &SegmentOptions, cut_short: bool) {
+        let n = self.profiles.len();
+        let percent = |k: usize| 100.0 * k as f64 / n.max(1) as f64;
+        if n < 50 {
+            self.findings.push(Finding::new("few-profiles", format!("{n} profiles; size distributions need at least 50, better some hundreds: use a larger photo, or several")));
+        }
+        let cut = self.profiles.iter().filter(|p| p.touches_edge).count();
+        if options.edge_rule == EdgeRule::Frame && cut_short {
+            self.findings.push(Finding::new("edge-heavy", "profiles reach over more than half the photo; the counting frame is cut short and favours small ones: use a larger photo".into()));
+        } else if percent(cut) > 25.0 {
+            self.findings.push(Finding::new(
+                "edge-heavy",
+                format!(
+                    "{:.0} % of the profiles are cut by the photo's edge; use a larger photo",
+                    percent(cut)
+                ),
+            ));
+        }
+        let small = self
+            .profiles
+            .iter()
+            .filter(|p| p.area < 1.5 * options.min_area as f64)
+            .count();
+        if percent(small) > 15.0 {
+            self.findings.push(Finding::new("near-minimum", format!("{:.0} % of the profiles are within half of the least area of {} pixels: many more may be too small to be seen; use a photo of higher resolution", percent(small), options.min_area)));
+        }
+    }
+
+    fn judge_binder(&mut self, binder: &BinderModel, _distance: &Array2<f32>, _options: &SegmentOptions) {
+        if binder.share() < 0.25 {
+            self.findings.push(Finding::new(
+                "no-binder",
+                format!(
+                    "the likeliest binder covers only {:.0} % of the photo; give its colour, or import a label map",
+                    100.0 * binder.share()
+                ),
+            ));
+        }
+    }
+}
+
+/// Labels whose pixels form several pieces, increasing.
+fn labels_in_pieces(labels: &Array2<u32>, pieces: &Array2<u32>) -> Vec<u32> {
+    let mut pairs: Vec<(u32, u32)> = Vec::new();
+    let mut last = (0, 0);
+    for pair in labels.iter().copied().zip(pieces.iter().copied()) {
+        if pair != last && pair.0 != 0 {
+            pairs.push(pair);
+        }
+        last = pair;
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut split: Vec<u32> = pairs.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[0].0).collect();
+    split.dedup();
+    split
+}

@@ -1,0 +1,210 @@
+//! A mask into profiles: touching particles of different colours first, then by shape.
+
+use std::collections::BTreeMap;
+
+use ndarray::Array2;
+
+use crate::{
+    kmeans::{kmeans, nearest_centre},
+    refine::core_colours,
+    regions::{connected_pieces, neighbours4},
+    watershed::{distance_transform, h_maxima, smooth_field, watershed},
+};
+
+/// Colour groups looked for inside the mask.
+const GROUPS: usize = 8;
+/// Depth, pixels, that both parts must have to count as particles of their own.
+const PART_DEPTH: f32 = 2.0;
+/// Difference of mean colour in Lab below which touching parts are one particle.
+const SAME_COLOUR: f64 = 14.0;
+
+/// What is known of a part of a region.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    sum: [f64; 3],
+    squares: f64,
+    count: f64,
+    depth: f32,
+}
+
+impl Part {
+    fn add(&mut self, other: &Self) {
+        (0..3).for_each(|c| self.sum[c] += other.sum[c]);
+        self.squares += other.squares;
+        self.count += other.count;
+        self.depth = self.depth.max(other.depth);
+    }
+
+    fn mean(&self) -> [f64; 3] {
+        self.sum.map(|s| s / self.count.max(1.0))
+    }
+
+    /// Total variance of the colour.
+    fn variance(&self) -> f64 {
+        let mean = self.mean();
+        (self.squares / self.count.max(1.0) - mean.iter().map(|m| m * m).sum::<f64>()).max(0.0)
+    }
+}
+
+/// Parts of one colour: each piece of the mask is cut where the colours of its cores fall in different groups, unless the parts are shallow or their mean colours too close for their texture. Numbers from 1.
+///
+/// # Complexity
+///
+/// Linear in pixels; a few thousand of them are grouped.
+#[must_use]
+pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -> Array2<u32> {
+    let cores = core_colours(lab, mask, 0);
+    let inside = cores.iter().flatten().count();
+    let sample: Vec<[f64; 3]> = cores
+        .iter()
+        .flatten()
+        .step_by((inside / 4000).max(1))
+        .map(|c| c.map(f64::from))
+        .collect();
+    let centres = kmeans(&sample, GROUPS, seed).centres;
+    let groups = cores.mapv(|c| c.map_or(0, |c| 1 + nearest_centre(&c.map(f64::from), &centres)));
+    let (mut parts, count) = connected_pieces(&groups, |g| g != 0);
+    let depth = distance_transform(&lined(&parts));
+    let mut known = vec![Part::default(); count as usize + 1];
+    let mut borders: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+    for ((y, x), &part) in parts.indexed_iter().filter(|(_, p)| **p != 0) {
+        let c = lab[[y, x]].map(f64::from);
+        let core = depth[[y, x]] >= 1.5;
+        let weight = if core { 1.0 } else { 1e-3 };
+        known[part as usize].add(&Part {
+            sum: c.map(|v| v * weight),
+            squares: c.iter().map(|v| v * v).sum::<f64>() * weight,
+            count: weight,
+            depth: depth[[y, x]],
+        });
+        for q in neighbours4([y, x], parts.dim()) {
+            let other = parts[q];
+            if other > part {
+                *borders.entry((part, other)).or_default() += 1.0;
+            }
+        }
+    }
+    let merged = merge(known, borders);
+    parts.mapv_inplace(|p| merged[p as usize]);
+    parts
+}
+
+/// Joins touching parts, the most alike first, until all that touch differ; the surviving number of each part.
+fn merge(mut known: Vec<Part>, borders: BTreeMap<(u32, u32), f64>) -> Vec<u32> {
+    let mut name: Vec<u32> = (0..known.len() as u32).collect();
+    let find = |name: &[u32], mut i: u32| {
+        while name[i as usize] != i {
+            i = name[i as usize];
+        }
+        i
+    };
+    loop {
+        let mut joined = false;
+        let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
+        let mut lengths: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+        for (&(a, b), &length) in &borders {
+            let (a, b) = (find(&name, a), find(&name, b));
+            if a != b {
+                *lengths.entry((a.min(b), a.max(b))).or_default() += length;
+            }
+        }
+        for (&(a, b), &length) in &lengths {
+            if let Some(cost) = unlikeness(&known[a as usize], &known[b as usize], length) {
+                pairs.push((cost, a, b));
+            }
+        }
+        pairs.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+        let mut touched = vec![false; known.len()];
+        for (_, a, b) in pairs {
+            // Costs of parts joined in this round are stale: they wait for the next.
+            if touched[a as usize] || touched[b as usize] {
+                continue;
+            }
+            touched[a as usize] = true;
+            touched[b as usize] = true;
+            let part = known[b as usize];
+            known[a as usize].add(&part);
+            name[b as usize] = a;
+            joined = true;
+        }
+        if !joined {
+            break;
+        }
+    }
+    (0..known.len() as u32).map(|i| find(&name, i)).collect()
+}
+
+/// How little two touching parts belong together; `None` if they are two particles.
+fn unlikeness(a: &Part, b: &Part, border: f64) -> Option<f64> {
+    let (ma, mb) = (a.mean(), b.mean());
+    let difference = (0..3).map(|c| (ma[c] - mb[c]).powi(2)).sum::<f64>().sqrt();
+    let texture = (0.5 * (a.variance() + b.variance())).sqrt();
+    let shallow = a.depth.min(b.depth) < PART_DEPTH;
+    if shallow {
+        // A rim of mixed colour goes where most of its outline is.
+        return Some(difference / (1.0 + border));
+    }
+    (difference < SAME_COLOUR.max(2.0 * texture)).then_some(1000.0 + difference)
+}
+
+/// Mask of the parts with lines one pixel wide between those that touch.
+fn lined(parts: &Array2<u32>) -> Array2<bool> {
+    let (height, width) = parts.dim();
+    Array2::from_shape_fn(parts.dim(), |(y, x)| {
+        let p = parts[[y, x]];
+        let differs = |q: u32| q != 0 && q != p;
+        p != 0 && !(x + 1 < width && differs(parts[[y, x + 1]])) && !(y + 1 < height && differs(parts[[y + 1, x]]))
+    })
+}
+
+/// Parts cut at their necks: the distance transform, smoothed, has one maximum that stands out for each particle, and a watershed gives each its pixels. Numbers from 1, 0 outside.
+///
+/// A maximum stands out if it is at least 1 pixel and 12 % of its own height above the neck; a relative height keeps large angular particles whole.
+///
+/// # Complexity
+///
+/// n log n in the pixels of the parts.
+#[must_use]
+pub fn split_by_shape(parts: &Array2<u32>) -> Array2<u32> {
+    let mask = lined(parts);
+    let mut depth = smooth_field(&distance_transform(&mask), 1.0);
+    depth.zip_mut_with(&mask, |d, &m| *d = if m { d.min(1e4) } else { 0.0 });
+    let markers = h_maxima(&depth, |height| 1.0_f32.max(0.12 * height));
+    let mut labels = watershed(&depth, &markers, &mask);
+    // The lines between parts go back to the part they were taken from.
+    for _ in 0..3 {
+        let before = labels.clone();
+        for ((y, x), &part) in parts.indexed_iter() {
+            if part != 0 && before[[y, x]] == 0 {
+                let same = neighbours4([y, x], parts.dim()).find(|&q| parts[q] == part && before[q] != 0);
+                labels[[y, x]] = same.map_or(0, |q| before[q]);
+            }
+        }
+    }
+    labels
+}
+
+/// Gives holes enclosed by a single label to that label.
+pub(crate) fn fill_label_holes(labels: &mut Array2<u32>) {
+    let (outside, count) = connected_pieces(labels, |l| l == 0);
+    const SEVERAL: u32 = u32::MAX;
+    let mut owner = vec![0_u32; count as usize + 1];
+    let (height, width) = labels.dim();
+    for ((y, x), &o) in outside.indexed_iter().filter(|(_, o)| **o != 0) {
+        let owner = &mut owner[o as usize];
+        if y == 0 || x == 0 || y + 1 == height || x + 1 == width {
+            *owner = SEVERAL;
+        }
+        for q in neighbours4([y, x], (height, width)) {
+            let label = labels[q];
+            if label != 0 && label != *owner {
+                *owner = if *owner == 0 { label } else { SEVERAL };
+            }
+        }
+    }
+    labels.zip_mut_with(&outside, |l, &o| {
+        if o != 0 && owner[o as usize] != SEVERAL {
+            *l = owner[o as usize];
+        }
+    });
+}

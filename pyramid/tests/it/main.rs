@@ -5,4 +5,7 @@
     reason = "tests make small numbers and compare exact ones"
 )]
 
+mod matching;
 mod pyramid;
+mod spheres;
+mod synthesis;

@@ -76,24 +76,32 @@ proptest! {
     }
 }
 
-/// A band at any angle is a combination of the K bands of the pyramid (steering): here cos³ from four.
+/// A wave of any direction θ shows in band b with the amplitude α cos³(θ − πb/4): the identity that steering rests on.
 #[test]
-fn four_cubed_cosines_steer() {
-    let angle = 0.37_f64;
-    let cubed = |t: f64| t.cos().powi(3);
-    // cos³(θ − φ) = Σ_b k_b cos³(θ − πb/4), k_b = (cos(φ_b) + cos(3 φ_b)) / 2 with φ_b = φ − πb/4.
-    let weights: Vec<f64> = (0..4)
-        .map(|b| {
-            let p = angle - std::f64::consts::PI * f64::from(b) / 4.0;
-            0.5 * (p.cos() + (3.0 * p).cos())
-        })
-        .collect();
-    for i in 0..50 {
-        let theta = 0.13 * f64::from(i);
-        let steered: f64 = (0..4)
-            .map(|b| weights[b] * cubed(theta - std::f64::consts::PI * b as f64 / 4.0))
-            .sum();
-        assert!((steered - cubed(theta - angle)).abs() < 1e-12);
+fn waves_show_in_each_orientation_by_the_cube_of_the_cosine() {
+    // At 10 to 14 cycles in 64 pixels (r of 0.44) all power is shared by levels 0 and 1.
+    for (ky, kx) in [(0, 14), (14, 0), (10, 10), (5, 13), (13, -5), (-9, 11)] {
+        let phase = |y: usize, x: usize| f64::from(ky) * y as f64 + f64::from(kx) * x as f64;
+        let wave = Array2::from_shape_fn((64, 64), |(y, x)| (std::f64::consts::TAU * phase(y, x) / 64.0).cos());
+        let summaries = SteerablePyramid::new([64, 64], 3, 4)
+            .unwrap()
+            .build(wave.view())
+            .unwrap()
+            .summaries();
+        let angle = f64::from(ky).atan2(f64::from(kx));
+        // α² = 4/5 for four orientations; a wave has mean square 1/2, shared by the levels.
+        for b in 0..4 {
+            let held: f64 = summaries
+                .iter()
+                .filter(|s| s.orientation == Some(b))
+                .map(|s| s.mean_square)
+                .sum();
+            let expected = 0.5 * 0.8 * (angle - std::f64::consts::PI * b as f64 / 4.0).cos().powi(6);
+            assert!(
+                (held - expected).abs() < 1e-12,
+                "wave ({ky}, {kx}), band {b}: {held} for {expected}"
+            );
+        }
     }
 }
 

@@ -1,0 +1,278 @@
+use ndarray::{Array2, Array3, Array4, ArrayView4, Axis};
+use std::ops::ControlFlow;
+use stereology_pyramid::{
+    Exemplar, Matching, Mode, SteerablePyramid, TextureError, TextureOptions, synthesize_image, synthesize_volume,
+    synthesize_volume_with_report,
+};
+
+const GO: &(dyn Fn(f64) -> ControlFlow<()> + Sync) = &|_| ControlFlow::Continue(());
+
+/// A speckled, blurred, periodic image with skewed values about zero: (y, x, channel).
+fn speckle(n: usize, channels: usize) -> Array3<f32> {
+    let hash = |y: usize, x: usize, c: usize| {
+        let mut h = (y * 0x9E37_79B1 + x * 0x85EB_CA6B + c * 0xC2B2_AE35 + 1) as u64;
+        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D_2C1B_3C6D);
+        h = (h ^ (h >> 29)).wrapping_mul(0x297A_2D39_297A_2D39);
+        ((h >> 40) as f32 / (1_u64 << 24) as f32).powi(3) - 0.25
+    };
+    Array3::from_shape_fn((n, n, channels), |(y, x, c)| {
+        let around = [(0, 0, 2.0), (1, 0, 1.0), (0, 1, 1.0), (n - 1, 0, 1.0), (0, n - 1, 1.0)];
+        around
+            .iter()
+            .map(|&(dy, dx, w)| {
+                w * (hash((y + dy) % n, (x + dx) % n, 0) + 0.3 * hash((y + dy) % n, (x + dx) % n, c + 1))
+            })
+            .sum::<f32>()
+            / 6.0
+    })
+}
+
+/// Mean squares of the pyramid bands of all slices along an axis, orientations pooled.
+fn band_variances(volume: ArrayView4<'_, f32>, axis: usize) -> Vec<f64> {
+    let plane = volume.index_axis(Axis(3), 0);
+    let mut sums = vec![0.0; 4];
+    for slice in plane.axis_iter(Axis(axis)) {
+        sums.iter_mut()
+            .zip(image_variances(&slice.to_owned()))
+            .for_each(|(sum, v)| *sum += v / plane.len_of(Axis(axis)) as f64);
+    }
+    sums
+}
+
+fn image_variances(image: &Array2<f32>) -> Vec<f64> {
+    let shape = [image.nrows(), image.ncols()];
+    let bands = SteerablePyramid::new(shape, 2, 4)
+        .and_then(|pyramid| pyramid.build(image.view()))
+        .expect("finite, large enough");
+    let all = bands.summaries();
+    let pooled = |level| {
+        all.iter()
+            .filter(|b| b.orientation.is_some() && b.level == level)
+            .map(|b| b.mean_square / 4.0)
+            .sum()
+    };
+    vec![all[0].mean_square, pooled(0), pooled(1), all[9].mean_square]
+}
+
+/// Slices along every axis have the exemplar's band variances within 3 %; those of the plain method do not come near.
+#[test]
+fn slices_have_the_band_variances_of_the_exemplar() {
+    let exemplar = speckle(64, 1);
+    let wanted = image_variances(&exemplar.index_axis(Axis(2), 0).to_owned());
+    let worst = |mode| {
+        let options = TextureOptions::default().with_mode(mode);
+        let volume = synthesize_volume(&Exemplar::new(exemplar.view()), [32, 32, 32], &options, GO).unwrap();
+        (0..3)
+            .flat_map(|axis| {
+                band_variances(volume.view(), axis)
+                    .into_iter()
+                    .zip(&wanted)
+                    .take(3)
+                    .map(|(v, w)| (v / w).ln().abs())
+                    .collect::<Vec<_>>()
+            })
+            .fold(0.0, f64::max)
+    };
+    let (slices, spectrum, volume) = (worst(Mode::Slices), worst(Mode::Spectrum), worst(Mode::Volume));
+    assert!(slices < 0.03, "slices: {slices}");
+    assert!(spectrum < 0.15, "spectrum: {spectrum}");
+    assert!(volume > 0.2, "volume: {volume}");
+}
+
+/// The wrap is a plane like any other, along all axes, and the sides need not be equal.
+#[test]
+fn volumes_repeat_without_a_seam() {
+    let exemplar = speckle(48, 3);
+    for mode in [Mode::Slices, Mode::Spectrum, Mode::Volume] {
+        let options = TextureOptions::default().with_mode(mode).with_iterations(2);
+        let volume: Array4<f32> =
+            synthesize_volume(&Exemplar::new(exemplar.view()), [24, 33, 20], &options, GO).unwrap();
+        assert_eq!(volume.dim(), (24, 33, 20, 3));
+        for axis in 0..3 {
+            let n = volume.len_of(Axis(axis));
+            let mut steps: Vec<f32> = (0..n)
+                .map(|i| {
+                    (&volume.index_axis(Axis(axis), i) - &volume.index_axis(Axis(axis), (i + 1) % n))
+                        .mapv(f32::abs)
+                        .mean()
+                        .unwrap()
+                })
+                .collect();
+            let wrap = steps[n - 1];
+            steps.sort_by(f32::total_cmp);
+            assert!(
+                wrap < 1.3 * steps[n / 2],
+                "{mode:?}, axis {axis}: {wrap} beside {}",
+                steps[n / 2]
+            );
+        }
+    }
+}
+
+/// Every channel of the result has the exemplar's mean and quantiles.
+#[test]
+fn channels_have_the_exemplar_distribution() {
+    let exemplar = speckle(40, 3);
+    for matching in [Matching::Table, Matching::Exact] {
+        let options = TextureOptions::default().with_matching(matching).with_iterations(2);
+        let image = synthesize_image(&Exemplar::new(exemplar.view()), [40, 40], &options, GO).unwrap();
+        for c in 0..3 {
+            let sorted = |a: &Array3<f32>| {
+                let mut v = a.index_axis(Axis(2), c).iter().copied().collect::<Vec<_>>();
+                v.sort_by(f32::total_cmp);
+                v
+            };
+            let (found, wanted) = (sorted(&image), sorted(&exemplar));
+            // The exemplar's periodic component is what is matched: nearly the exemplar, as this one closes on itself.
+            let distance = found.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).sum::<f32>() / 1600.0;
+            assert!(distance < 0.05 * exemplar.std(0.0), "{distance}");
+            let mean = |v: &[f32]| v.iter().map(|&v| f64::from(v)).sum::<f64>() / 1600.0;
+            assert!((mean(&found) - mean(&wanted)).abs() < 1e-4);
+        }
+    }
+}
+
+/// Pixels outside the mask are never read: garbage and NaN there give the same bits.
+#[test]
+fn what_is_masked_out_is_never_read() {
+    let exemplar = speckle(48, 3);
+    let mask = Array2::from_shape_fn((48, 48), |(y, x)| (y as f32 - 20.0).hypot(x as f32 - 30.0) > 11.0);
+    let spoilt = |value: f32| {
+        let mut image = exemplar.clone();
+        for (mut pixel, &inside) in image.lanes_mut(Axis(2)).into_iter().zip(&mask) {
+            if !inside {
+                pixel.fill(value);
+            }
+        }
+        let options = TextureOptions::default().with_iterations(2);
+        synthesize_volume(
+            &Exemplar::new(image.view()).with_mask(mask.view()),
+            [16, 16, 16],
+            &options,
+            GO,
+        )
+        .unwrap()
+    };
+    let (nan, loud) = (spoilt(f32::NAN), spoilt(9.0));
+    assert_eq!(nan, loud);
+    assert!(nan.iter().all(|v| v.abs() < 1.0));
+}
+
+/// Under a mask with many holes, statistics stay those of the whole texture: what the binder of a photograph needs.
+#[test]
+fn a_masked_texture_keeps_its_band_variances() {
+    let exemplar = speckle(128, 1);
+    let wanted = image_variances(&exemplar.index_axis(Axis(2), 0).to_owned());
+    let mut spoilt = exemplar.clone();
+    let hole = |y: usize, x: usize| ((y % 24) as f32 - 12.0).hypot((x % 26) as f32 - 13.0) < 8.5;
+    let mask = Array2::from_shape_fn((128, 128), |(y, x)| !hole(y, x));
+    spoilt
+        .indexed_iter_mut()
+        .filter(|((y, x, _), _)| hole(*y, *x))
+        .for_each(|(_, v)| *v = 5.0);
+    let options = TextureOptions::default().with_levels(2).with_iterations(4);
+    let binder = Exemplar::new(spoilt.view()).with_mask(mask.view());
+    let volume = synthesize_volume(&binder, [32, 32, 32], &options, GO).unwrap();
+    for axis in 0..3 {
+        for (found, wanted) in band_variances(volume.view(), axis).iter().zip(&wanted).take(3) {
+            assert!((found / wanted).ln().abs() < 0.15, "{found} for {wanted}");
+        }
+    }
+}
+
+/// Same seed, same bits at any number of threads; another seed, another texture.
+#[test]
+fn same_bits_at_any_number_of_threads() {
+    let exemplar = speckle(40, 3);
+    let with = |threads: usize, seed: u64, mode: Mode| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = TextureOptions::default()
+            .with_mode(mode)
+            .with_iterations(2)
+            .with_seed(seed);
+        pool.install(|| synthesize_volume(&Exemplar::new(exemplar.view()), [24, 24, 24], &options, GO).unwrap())
+    };
+    for mode in [Mode::Slices, Mode::Spectrum, Mode::Volume] {
+        assert_eq!(with(1, 5, mode), with(3, 5, mode));
+    }
+    assert_ne!(with(1, 5, Mode::Slices), with(1, 6, Mode::Slices));
+}
+
+/// Flat colours stay flat; a flat channel among others stays flat.
+#[test]
+fn constant_channels_are_kept() {
+    let mut exemplar = speckle(32, 3);
+    exemplar.index_axis_mut(Axis(2), 1).fill(0.4);
+    let volume = synthesize_volume(
+        &Exemplar::new(exemplar.view()),
+        [16, 16, 16],
+        &TextureOptions::default(),
+        GO,
+    )
+    .unwrap();
+    assert!(volume.index_axis(Axis(3), 1).iter().all(|v| (v - 0.4).abs() < 1e-5));
+    exemplar.fill(0.7);
+    for mode in [Mode::Slices, Mode::Spectrum, Mode::Volume] {
+        let options = TextureOptions::default().with_mode(mode);
+        let (volume, report) =
+            synthesize_volume_with_report(&Exemplar::new(exemplar.view()), [8, 8, 8], &options, GO).unwrap();
+        assert!(volume.iter().all(|v| (v - 0.7).abs() < 1e-6));
+        assert_eq!(report.findings[0].code, "constant-exemplar");
+    }
+}
+
+/// What cannot be made is refused by name, before memory is asked for.
+#[test]
+fn bad_input_is_refused() {
+    let options = TextureOptions::default();
+    let exemplar = speckle(16, 3);
+    let make = |image: &Array3<f32>, size| synthesize_volume(&Exemplar::new(image.view()), size, &options, GO);
+    assert!(matches!(
+        make(&speckle(7, 3), [16; 3]),
+        Err(TextureError::ExemplarTooSmall { height: 7, width: 7 })
+    ));
+    assert!(matches!(
+        make(&exemplar, [16, 7, 16]),
+        Err(TextureError::ResultTooSmall { .. })
+    ));
+    assert!(
+        matches!(make(&exemplar, [1_000_000; 3]), Err(TextureError::TooLarge { bytes, .. }) if bytes > 10_u128.pow(19))
+    );
+    assert!(matches!(
+        make(&exemplar, [usize::MAX; 3]),
+        Err(TextureError::TooLarge { .. })
+    ));
+    assert!(matches!(
+        make(&Array3::zeros((16, 16, 0)), [16; 3]),
+        Err(TextureError::NoChannels)
+    ));
+    let mut bad = exemplar.clone();
+    bad[[3, 4, 1]] = f32::NAN;
+    assert_eq!(make(&bad, [16; 3]), Err(TextureError::NotFinite { row: 3, column: 4 }));
+    let with = |mask: &Array2<bool>| {
+        synthesize_volume(
+            &Exemplar::new(exemplar.view()).with_mask(mask.view()),
+            [16; 3],
+            &options,
+            GO,
+        )
+    };
+    assert!(matches!(
+        with(&Array2::from_elem((16, 15), true)),
+        Err(TextureError::MaskShape { .. })
+    ));
+    assert!(matches!(
+        with(&Array2::from_elem((16, 16), false)),
+        Err(TextureError::MaskTooSmall { selected: 0, .. })
+    ));
+    let stop = |_: f64| ControlFlow::Break(());
+    assert_eq!(
+        synthesize_volume(&Exemplar::new(exemplar.view()), [16; 3], &options, &stop),
+        Err(TextureError::Cancelled)
+    );
+    let none = options.clone().with_orientations(0);
+    assert!(matches!(
+        synthesize_image(&Exemplar::new(exemplar.view()), [16; 2], &none, GO),
+        Err(TextureError::Options { .. })
+    ));
+}

@@ -43,10 +43,13 @@ pub(crate) const APART: f64 = -1e-9;
 /// Longest step that is stable for a particle of twelve contacts, of stiffness 1 each (measured: .8 diverges for cubes).
 const STEP: f64 = 0.6;
 const SHORTEST_STEP: f64 = 0.15;
-/// Nobody moves further in a step than this part of its radius, or turns by more than this angle.
+/// Nobody moves further in a step than this part of its radius or of the mean radius, or turns by more than this angle. A grain of dust under a boulder has
+/// far to go.
 const STRIDE: f64 = 0.2;
 /// Progress is judged after so many iterations.
 const WATCH: usize = 100;
+/// An overlap of this part of a pair's width that does not yield.
+const HOPELESS: f64 = 0.03;
 
 /// Relaxes until no pair overlaps at true size. Energies are appended to `trace`.
 pub(crate) fn relax(
@@ -73,10 +76,11 @@ pub(crate) fn relax(
             return End::Cancelled;
         }
         if iteration % WATCH == WATCH - 1 {
-            if overlaps.energy > before {
-                motion.step = (0.7 * motion.step).max(SHORTEST_STEP);
-            } else if overlaps.energy > 0.98 * before && motion.age > 10 * WATCH {
-                if shakes == limits.shakes {
+            // Shaking loosens particles that hold each other by a little; deep overlaps that stay mean that there is no room.
+            let hopeless = overlaps.worst > HOPELESS;
+            let patience = if hopeless { 4 * WATCH } else { 10 * WATCH };
+            if overlaps.energy > 0.98 * before && motion.age > patience {
+                if hopeless || shakes == limits.shakes {
                     return End::Stuck;
                 }
                 shakes += 1;
@@ -85,6 +89,9 @@ pub(crate) fn relax(
                 motion = Motion::new(assembly);
                 before = f64::INFINITY;
                 continue;
+            }
+            if overlaps.energy > before {
+                motion.step = (0.7 * motion.step).max(SHORTEST_STEP);
             }
             before = overlaps.energy;
         }
@@ -173,6 +180,8 @@ struct Motion {
     torque: Vec<Vector3<f64>>,
     mass: Vec<f64>,
     inertia: Vec<f64>,
+    /// Mean radius.
+    mean: f64,
     step: f64,
     age: usize,
 }
@@ -195,6 +204,7 @@ impl Motion {
             torque: vec![Vector3::zeros(); turning],
             mass,
             inertia,
+            mean,
             step: STEP,
             age: 0,
         }
@@ -213,7 +223,7 @@ impl Motion {
         };
         for i in 0..self.velocity.len() {
             let velocity = self.velocity[i] * keep + self.force[i] * (self.step / self.mass[i]);
-            self.velocity[i] = bounded(velocity, STRIDE * assembly.radius[i] / self.step);
+            self.velocity[i] = bounded(velocity, STRIDE * assembly.radius[i].max(self.mean) / self.step);
             assembly.shift(i, &(self.velocity[i] * self.step));
         }
         for i in 0..self.spin.len() {

@@ -77,6 +77,22 @@ fn wide_sizes_are_packed() {
     packed(&spheres, 1000, 0.8, 0.55, 2, &PackOptions::default()).unwrap();
 }
 
+/// Grains of dust must come out from under boulders a thousand times their size without a step for every grain's width.
+#[test]
+fn dust_gets_out_from_under_boulders() {
+    let spheres = [UnitBody::new(&Body::sphere(1.0).unwrap())];
+    let mut sizes = vec![1.0; 20];
+    sizes.extend((1..400).map(|k| 0.2 / f64::from(k)));
+    let grains = mix(&sizes, &[1.0], 0).unwrap();
+    let period = box_for_fraction(&spheres, &grains, 0.4).unwrap();
+    let start = populate(&grains, &period, 0);
+    let packing = pack(&spheres, start, &period, &PackOptions::default(), &|_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert!(packing.iterations() < 500, "{}", packing.iterations());
+}
+
 #[test]
 fn faces_pack_flat() {
     // Face against face the energy has creases; this is where dynamics that stop at every uphill step stall.

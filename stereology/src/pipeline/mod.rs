@@ -1,15 +1,25 @@
 //! The chain from a photograph to its solid: what composes the rooms.
+//!
+//! [`synthesize`] is the whole chain; its steps can be called alone: [`measured_profiles`], [`particle_densities`], [`population`], [`fine_details`], [`verify`].
 
 mod association;
+mod colouring;
 mod densities;
+mod fine_details;
 mod particle_types;
 mod population;
+mod synthesis;
+mod verification;
 mod warning;
 mod wasserstein;
 
 pub use association::{Association, SIGNIFICANT, association};
+pub use colouring::particle_colours;
 pub use densities::{DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, particle_densities};
+pub use fine_details::{FineDetails, fine_details};
 pub use particle_types::{ParticleType, ParticleTypes, ParticleTypesError};
 pub use population::{Extent, Population, PopulationFailure, population};
+pub use synthesis::{Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize};
+pub use verification::{Comparison, Recipe, Verification, VerificationError, verify};
 pub use warning::Warning;
 pub use wasserstein::wasserstein;

@@ -1,0 +1,255 @@
+//! The whole chain: a photograph in, a solid out, and what tells whether to trust it.
+
+use crate::pipeline::colouring::particle_colours;
+use crate::pipeline::{
+    DensityError, DensityOptions, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes, Population,
+    PopulationFailure, Recipe, Verification, VerificationError, Warning, fine_details, particle_densities, population,
+    verify,
+};
+use image::RgbImage;
+use ndarray::Array2;
+use std::ops::ControlFlow;
+use stereology_anneal::{PackError, PackOptions, Packing, pack, populate};
+use stereology_pyramid::{TextureError, TextureOptions};
+use stereology_segment::{SegmentError, SegmentOptions, Segmentation, segment};
+use stereology_unfold::UnfoldError;
+use stereology_volume::{Solid, SolidError};
+
+/// A step of the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Step {
+    /// Finding profiles.
+    Segment,
+    /// Densities from profiles.
+    Unfold,
+    /// Particles in a box.
+    Pack,
+    /// The residual volume.
+    Texture,
+    /// Sections of the solid.
+    Verify,
+}
+
+impl Step {
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Segment => "segment",
+            Self::Unfold => "unfold",
+            Self::Pack => "pack",
+            Self::Texture => "texture",
+            Self::Verify => "verify",
+        }
+    }
+}
+
+/// How to make a solid.
+#[derive(Clone, Debug)]
+pub struct SynthesisOptions {
+    /// Size of a pixel: the unit of all lengths below and of the results.
+    pub pixel: f64,
+    /// Finding profiles; areas in pixels.
+    pub segment: SegmentOptions,
+    /// Unfolding.
+    pub densities: DensityOptions,
+    /// How large the solid is.
+    pub extent: Extent,
+    /// Volume fraction of particles; by default the photograph's area fraction.
+    pub fraction: Option<f64>,
+    /// Packing.
+    pub pack: PackOptions,
+    /// The residual volume.
+    pub texture: TextureOptions,
+    /// Voxels of its side, each as large as a pixel.
+    pub texture_voxels: usize,
+    /// Same seed, same bits.
+    pub seed: u64,
+}
+
+impl Default for SynthesisOptions {
+    /// Lengths in pixels, a texture of 128³ voxels, everything else as its step has it.
+    fn default() -> Self {
+        Self {
+            pixel: 1.0,
+            segment: SegmentOptions::default(),
+            densities: DensityOptions::default(),
+            extent: Extent::default(),
+            fraction: None,
+            pack: PackOptions::default(),
+            texture: TextureOptions::default(),
+            texture_voxels: 128,
+            seed: 0,
+        }
+    }
+}
+
+/// A solid, and everything that was found on the way.
+#[derive(Clone, Debug)]
+pub struct Synthesis {
+    /// The profiles of the photograph.
+    pub segmentation: Segmentation,
+    /// What was unfolded, in the unit of length.
+    pub profiles: MeasuredProfiles,
+    /// Particles per volume.
+    pub densities: ParticleDensities,
+    /// Which particles were packed, and why so many.
+    pub population: Population,
+    /// Their packing, certified.
+    pub packing: Packing,
+    /// The residual.
+    pub details: FineDetails,
+    /// The solid.
+    pub solid: Solid,
+    /// Its sections beside the photograph.
+    pub verification: Verification,
+    /// Everything a reader should know, in the order of the steps.
+    pub warnings: Vec<Warning>,
+}
+
+/// A solid that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SynthesisError {
+    /// Finding profiles.
+    #[error(transparent)]
+    Segment(#[from] SegmentError),
+    /// Unfolding them.
+    #[error(transparent)]
+    Densities(#[from] DensityError),
+    /// Choosing particles.
+    #[error(transparent)]
+    Population(#[from] PopulationFailure),
+    /// Packing them.
+    #[error(transparent)]
+    Pack(#[from] PackError),
+    /// The residual volume.
+    #[error(transparent)]
+    Texture(#[from] TextureError),
+    /// Putting the solid together.
+    #[error(transparent)]
+    Solid(#[from] SolidError),
+    /// Comparing it with the photograph.
+    #[error(transparent)]
+    Verification(#[from] VerificationError),
+    /// A pixel must have a size.
+    #[error("the size of a pixel is {0}: it must be positive and finite")]
+    Pixel(f64),
+}
+
+impl SynthesisError {
+    /// Did the caller break off?
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Self::Segment(SegmentError::Cancelled)
+                | Self::Densities(DensityError::Unfold(UnfoldError::Cancelled))
+                | Self::Pack(PackError::Cancelled)
+                | Self::Texture(TextureError::Cancelled)
+                | Self::Verification(VerificationError::Cancelled)
+        )
+    }
+}
+
+/// Makes the solid of a photograph, with its profiles segmented or taken from a label map (y, x).
+///
+/// `progress` is told the step and how far it is, and may break off. Memory: some hundred bytes a pixel and a voxel of the texture.
+///
+/// # Errors
+///
+/// [`SynthesisError`]: the step that failed, and why.
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, sections 3 and 4.
+pub fn synthesize(
+    photo: &RgbImage,
+    labels: Option<Array2<u32>>,
+    types: &ParticleTypes,
+    options: &SynthesisOptions,
+    progress: &(dyn Fn(Step, f64) -> ControlFlow<()> + Sync),
+) -> Result<Synthesis, SynthesisError> {
+    if !(options.pixel.is_finite() && options.pixel > 0.0) {
+        return Err(SynthesisError::Pixel(options.pixel));
+    }
+    let recipe = match labels {
+        Some(_) => Recipe::Labelled(&options.segment),
+        None => Recipe::Segmented(&options.segment),
+    };
+    let segmentation = match labels {
+        Some(labels) => Segmentation::from_labels(photo, labels, &options.segment)?,
+        None => segment(photo, &options.segment, &|done| progress(Step::Segment, done))?,
+    };
+    let profiles = measured_profiles(&segmentation, options.pixel);
+    let densities = particle_densities(&profiles, types, &options.densities, &|done| {
+        progress(Step::Unfold, done)
+    })?;
+    let fraction = options.fraction.unwrap_or(segmentation.area_fraction);
+    let texture_period = options.texture_voxels as f64 * options.pixel;
+    let population = population(
+        &densities,
+        types,
+        fraction,
+        options.extent,
+        texture_period,
+        options.seed,
+    )?;
+    let bodies = types.unit_bodies();
+    let start = populate(&population.grains, &population.period, options.seed);
+    let packing = pack(&bodies, start, &population.period, &options.pack, &|done| {
+        progress(Step::Pack, done)
+    })?;
+    let details = fine_details(
+        &segmentation,
+        &segmentation.residual(),
+        options.texture_voxels,
+        options.pixel,
+        &options.texture,
+        &|done| progress(Step::Texture, done),
+    )?;
+    let solid = Solid::new(
+        bodies,
+        packing.particles().to_vec(),
+        particle_colours(&packing, &segmentation.profiles, options.seed),
+        population.period,
+        segmentation.binder.colour.map(|c| c as f32),
+        Some(details.residual.clone()),
+    )?;
+    let verification = verify(&solid, &segmentation, &profiles, recipe, options.pixel, &|done| {
+        progress(Step::Verify, done)
+    })?;
+    let mut warnings: Vec<Warning> = segmentation
+        .findings
+        .iter()
+        .map(|finding| Warning::new(finding.code, finding.message.clone()))
+        .collect();
+    warnings.extend(densities.warnings());
+    warnings.extend(population.warnings.iter().cloned());
+    warnings.extend(details.warnings.iter().cloned());
+    Ok(Synthesis {
+        segmentation,
+        profiles,
+        densities,
+        population,
+        packing,
+        details,
+        solid,
+        verification,
+        warnings,
+    })
+}
+
+/// The profiles of a segmentation in the unit of length, ready to be unfolded.
+#[must_use]
+pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredProfiles {
+    let profiles = &segmentation.profiles;
+    MeasuredProfiles {
+        sizes: profiles.iter().map(|profile| profile.size * pixel).collect(),
+        weights: profiles.iter().map(|profile| profile.weight).collect(),
+        categories: profiles.iter().map(|profile| profile.category).collect(),
+        area: segmentation.window.area * pixel * pixel,
+        // A profile of exactly the least area was kept: the threshold lies just below it.
+        min_size: segmentation.min_size * pixel * (1.0 - 1e-9),
+    }
+}

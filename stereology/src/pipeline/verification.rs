@@ -1,0 +1,289 @@
+//! The loop closed: sections of the finished solid measured like the photograph.
+
+use crate::pipeline::{MeasuredProfiles, wasserstein};
+use image::RgbImage;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use stereology_segment::{SegmentError, SegmentOptions, Segmentation, connected_pieces, segment};
+use stereology_volume::{Axis, SlicePlane, Solid, SolidError};
+
+/// Sections of the solid beside the photograph.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    /// Sections measured exactly, from the bodies: what unfolding and packing got right.
+    pub exact: Comparison,
+    /// Sections drawn at the photograph's scale and measured by the photograph's recipe: the only test that shows a bias of segmentation. `None` if the
+    /// recipe found no particles on them.
+    pub resegmented: Option<Comparison>,
+    /// Profile sizes of the exact sections, above the photograph's threshold.
+    pub section_sizes: Vec<f64>,
+    /// Area of the exact sections; length squared.
+    pub section_area: f64,
+    /// The sections that were drawn.
+    pub pictures: Vec<RgbImage>,
+}
+
+/// How sections compare with the photograph.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// Profiles counted on the photograph.
+    pub profiles_photo: usize,
+    /// Profiles counted on the sections.
+    pub profiles_synthetic: usize,
+    /// Wasserstein-1 distance of the profile sizes, over their mean on the photograph.
+    pub size_w1: f64,
+    /// Share of the photograph inside profiles.
+    pub area_fraction_photo: f64,
+    /// Share of the sections inside profiles.
+    pub area_fraction_synthetic: f64,
+    /// Wasserstein-1 distance of the colours, mean over red, green and blue, encoded values / 255: of mean colours by area in exact sections, of pixels in drawn ones.
+    pub colour_distance: f64,
+}
+
+/// A verification that could not be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerificationError {
+    /// A section could not be drawn.
+    #[error(transparent)]
+    Solid(#[from] SolidError),
+    /// A section could not be segmented for another reason than having no particles.
+    #[error("a section of the solid could not be segmented: {0}")]
+    Segment(#[from] SegmentError),
+    /// The caller broke off.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Exact sections an axis.
+const DEPTHS: usize = 32;
+/// Drawn sections: enough for twice the photograph's area, within these.
+const FEWEST_PICTURES: usize = 3;
+const MOST_PICTURES: usize = 6;
+/// Pixels of a side of a drawn section.
+const LARGEST_PICTURE: f64 = 1024.0;
+
+/// How the photograph's profiles were found, to do the same with sections.
+#[derive(Clone, Copy, Debug)]
+pub enum Recipe<'a> {
+    /// By segmentation with these options.
+    Segmented(&'a SegmentOptions),
+    /// From a label map of another tool; sections then give the labels of their pixels.
+    Labelled(&'a SegmentOptions),
+}
+
+/// Sections `solid` at many depths along all axes and compares profile sizes, area fraction and colours with the photograph's.
+///
+/// `pixel` is the size of a pixel of the photograph. Cost: 96 exact sections and some pictures of the solid's period.
+///
+/// # Errors
+///
+/// [`VerificationError`].
+pub fn verify(
+    solid: &Solid,
+    photo: &Segmentation,
+    profiles: &MeasuredProfiles,
+    recipe: Recipe<'_>,
+    pixel: f64,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<Verification, VerificationError> {
+    let go_on = |done: f64| match progress(done) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(VerificationError::Cancelled),
+    };
+    go_on(0.0)?;
+    let photo_sizes: Vec<(f64, f64)> = profiles
+        .sizes
+        .iter()
+        .copied()
+        .zip(profiles.weights.iter().copied())
+        .filter(|(_, weight)| *weight > 0.0)
+        .collect();
+    let sections = exact_sections(solid, profiles.min_size);
+    let exact = Comparison {
+        profiles_photo: photo_sizes.len(),
+        profiles_synthetic: sections.sizes.len(),
+        size_w1: size_w1(
+            &photo_sizes,
+            &sections.sizes.iter().map(|&size| (size, 1.0)).collect::<Vec<_>>(),
+        ),
+        area_fraction_photo: photo.area_fraction,
+        area_fraction_synthetic: sections.covered / sections.area,
+        colour_distance: colour_distance(&mean_colours(photo), &sections.colours),
+    };
+    go_on(0.2)?;
+
+    let pictures = drawn_sections(solid, photo, pixel)?;
+    go_on(0.4)?;
+    let measured = pictures
+        .par_iter()
+        .map(|drawn| measure(drawn, recipe, &|_| progress(0.4)))
+        .collect::<Result<Vec<_>, VerificationError>>()?;
+    let measured: Vec<Segmentation> = measured.into_iter().flatten().collect();
+    let resegmented = (!measured.is_empty()).then(|| {
+        let sizes: Vec<(f64, f64)> = measured
+            .iter()
+            .flat_map(|of| of.profiles.iter().map(|profile| (profile.size * pixel, profile.weight)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect();
+        let whole: f64 = pictures
+            .iter()
+            .map(|drawn| f64::from(drawn.picture.width() * drawn.picture.height()))
+            .sum();
+        let covered: f64 = measured
+            .iter()
+            .map(|of| of.area_fraction * of.labels.len() as f64)
+            .sum();
+        let pixels: Vec<&RgbImage> = pictures.iter().map(|drawn| &drawn.picture).collect();
+        Comparison {
+            profiles_photo: photo_sizes.len(),
+            profiles_synthetic: sizes.len(),
+            size_w1: size_w1(&photo_sizes, &sizes),
+            area_fraction_photo: photo.area_fraction,
+            area_fraction_synthetic: covered / whole,
+            colour_distance: colour_distance(&pixel_colours(&[photo.photo()]), &pixel_colours(&pixels)),
+        }
+    });
+    go_on(1.0)?;
+    Ok(Verification {
+        exact,
+        resegmented,
+        section_sizes: sections.sizes,
+        section_area: sections.area,
+        pictures: pictures.into_iter().map(|drawn| drawn.picture).collect(),
+    })
+}
+
+fn size_w1(photo: &[(f64, f64)], synthetic: &[(f64, f64)]) -> f64 {
+    let weight: f64 = photo.iter().map(|(_, weight)| weight).sum();
+    let mean = photo.iter().map(|(size, weight)| size * weight).sum::<f64>() / weight;
+    wasserstein(photo, synthetic) / mean
+}
+
+/// Colours with how much each counts, by channel.
+type Colours = [Vec<(f64, f64)>; 3];
+
+fn colour_distance(a: &Colours, b: &Colours) -> f64 {
+    a.iter().zip(b).map(|(a, b)| wasserstein(a, b)).sum::<f64>() / 3.0
+}
+
+/// The mean colours of profiles and binder, by area.
+fn mean_colours(photo: &Segmentation) -> Colours {
+    std::array::from_fn(|channel| {
+        let covered: f64 = photo.profiles.iter().map(|profile| profile.area).sum();
+        let binder = (photo.binder.colour[channel], photo.labels.len() as f64 - covered);
+        photo
+            .profiles
+            .iter()
+            .map(|profile| (profile.colour[channel], profile.area))
+            .chain([binder])
+            .collect()
+    })
+}
+
+fn pixel_colours(pictures: &[&RgbImage]) -> Colours {
+    std::array::from_fn(|channel| {
+        let mut counts = [0.0; 256];
+        for picture in pictures {
+            for pixel in picture.pixels() {
+                counts[usize::from(pixel.0[channel])] += 1.0;
+            }
+        }
+        counts
+            .iter()
+            .enumerate()
+            .map(|(value, &count)| (value as f64 / 255.0, count))
+            .collect()
+    })
+}
+
+struct Sections {
+    sizes: Vec<f64>,
+    area: f64,
+    covered: f64,
+    colours: Colours,
+}
+
+/// Equally spaced planes across all three axes; profiles above `min_size`.
+fn exact_sections(solid: &Solid, min_size: f64) -> Sections {
+    let sides = solid.period().sides();
+    let planes: Vec<(Axis, f64)> = [Axis::X, Axis::Y, Axis::Z]
+        .into_iter()
+        .flat_map(|axis| (0..DEPTHS).map(move |i| (axis, (i as f64 + 0.5) / DEPTHS as f64 * sides[axis.index()])))
+        .collect();
+    let found: Vec<Vec<(usize, f64)>> = planes
+        .par_iter()
+        .map(|&(axis, depth)| solid.section_profiles(axis, depth))
+        .collect();
+    let area: f64 = planes
+        .iter()
+        .map(|(axis, _)| solid.period().volume() / sides[axis.index()])
+        .sum();
+    let mut sections = Sections {
+        sizes: Vec::new(),
+        area,
+        covered: 0.0,
+        colours: Colours::default(),
+    };
+    for (particle, profile) in found.into_iter().flatten() {
+        let size = (4.0 * profile / std::f64::consts::PI).sqrt();
+        if size <= min_size {
+            continue;
+        }
+        sections.sizes.push(size);
+        sections.covered += profile;
+        for channel in 0..3 {
+            sections.colours[channel].push((f64::from(solid.colours()[particle][channel]), profile));
+        }
+    }
+    for channel in 0..3 {
+        sections.colours[channel].push((f64::from(solid.binder()[channel]), area - sections.covered));
+    }
+    sections
+}
+
+/// A section at the photograph's scale.
+struct DrawnSection {
+    picture: RgbImage,
+    labels: ndarray::Array2<u32>,
+}
+
+fn drawn_sections(solid: &Solid, photo: &Segmentation, pixel: f64) -> Result<Vec<DrawnSection>, SolidError> {
+    let sides = solid.period().sides();
+    let pixels = (sides.min() / pixel).round().clamp(16.0, LARGEST_PICTURE) as u32;
+    let enough = (2.0 * photo.labels.len() as f64 / f64::from(pixels).powi(2)).ceil() as usize;
+    (0..enough.clamp(FEWEST_PICTURES, MOST_PICTURES))
+        .map(|i| {
+            let axis = [Axis::X, Axis::Y, Axis::Z][i % 3];
+            // The golden ratio keeps depths apart, however many.
+            let depth = (0.5 + i as f64 * 0.618_033_988_749_895).fract() * sides[axis.index()];
+            let plane = SlicePlane::across(axis, depth);
+            Ok(DrawnSection {
+                picture: solid.slice(&plane, pixels, pixels, pixel)?,
+                labels: solid.slice_ids(&plane, pixels, pixels, pixel)?,
+            })
+        })
+        .collect()
+}
+
+/// The profiles of a drawn section by the photograph's recipe; `None` if it finds none.
+fn measure(
+    drawn: &DrawnSection,
+    recipe: Recipe<'_>,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<Option<Segmentation>, VerificationError> {
+    let found = match recipe {
+        Recipe::Segmented(options) => segment(&drawn.picture, options, progress),
+        Recipe::Labelled(options) => {
+            // Two images of one particle are two profiles.
+            let (labels, _) = connected_pieces(&drawn.labels, |id| id != 0);
+            Segmentation::from_labels(&drawn.picture, labels, options)
+        }
+    };
+    match found {
+        Ok(segmentation) => Ok(Some(segmentation)),
+        Err(SegmentError::NoParticles { .. } | SegmentError::SingleColour { .. } | SegmentError::NoLabels) => Ok(None),
+        Err(SegmentError::Cancelled) => Err(VerificationError::Cancelled),
+        Err(error) => Err(error.into()),
+    }
+}

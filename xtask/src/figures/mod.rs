@@ -1,0 +1,30 @@
+//! The paper's figures, drawn again from this workspace: pictures and tables under docs/figures.
+
+mod bars;
+mod density_recovery;
+mod section_likelihood;
+mod solids;
+
+use std::path::Path;
+
+use anyhow::Result;
+
+/// Draws all figures, or those whose name holds `only`, into `folder`.
+pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    type Figure = fn(&Path) -> Result<()>;
+    let figures: [(&str, Figure); 5] = [
+        ("figure-04-section-likelihood", section_likelihood::draw),
+        ("figure-05-10-solid", solids::draw_blocks),
+        ("figure-06-residual", solids::draw_residual),
+        ("figure-07-density-recovery", density_recovery::draw),
+        ("figure-08-recovered-volume", density_recovery::draw_volumes),
+    ];
+    for (name, draw) in figures {
+        if only.is_none_or(|only| name.contains(only)) {
+            println!("{name}");
+            draw(folder)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! A block of the solid, three of its faces seen, as the paper shows one (figure 5).
+
+use crate::camera::Camera;
+use crate::mesh_picture::{RenderError, RenderOptions, render_mesh};
+use crate::tile::Colour;
+use image::RgbImage;
+use nalgebra::{Point3, Vector3};
+use stereology_shape::TriangleMesh;
+
+/// How a block is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockOptions {
+    /// Where it is seen from; z is up.
+    pub camera: Camera,
+    /// Pixels, places a pixel, background, ground, gloss.
+    pub picture: RenderOptions,
+}
+
+impl Default for BlockOptions {
+    /// 800 × 800 pixels of 3 × 3 places on white, from above a corner, dull: the top keeps its colours, the sides are in gentle shade.
+    fn default() -> Self {
+        let camera = Camera {
+            azimuth: 38.0,
+            elevation: 30.0,
+            distance: None,
+            field_of_view: 22.0,
+            up: Vector3::z_axis(),
+        };
+        let picture = RenderOptions {
+            width: 800,
+            height: 800,
+            samples: 3,
+            background: [1.0; 3],
+            ground: true,
+            gloss: 0.0,
+        };
+        Self { camera, picture }
+    }
+}
+
+impl BlockOptions {
+    /// With this many pixels.
+    ///
+    /// ```
+    /// # use stereology_render::BlockOptions;
+    /// assert_eq!(BlockOptions::default().with_size(300, 200).picture.width, 300);
+    /// ```
+    #[must_use]
+    pub const fn with_size(self, width: u32, height: u32) -> Self {
+        Self {
+            picture: self.picture.with_size(width, height),
+            ..self
+        }
+    }
+}
+
+/// Picture of the box from the origin to `sides`: its top and two sides, cut from whatever `colour` says is at a point (sRGB-encoded values / 255).
+///
+/// # Errors
+///
+/// [`RenderError::Sides`] unless all three are positive and finite, [`RenderError::Options`].
+///
+/// # Examples
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use stereology_render::{BlockOptions, render_block};
+///
+/// let grey = render_block(&|_| [0.5; 3], Vector3::repeat(1.0), &BlockOptions::default().with_size(101, 101))?;
+/// let top = grey.get_pixel(50, 30).0[0];
+/// assert!(top.abs_diff(128) <= 2); // the top keeps its colour
+/// assert!(grey.get_pixel(35, 65).0[0] < top); // the sides are in shade
+/// assert_eq!(grey.get_pixel(2, 2).0, [255; 3]);
+/// # Ok::<(), stereology_render::RenderError>(())
+/// ```
+pub fn render_block(colour: Colour<'_>, sides: Vector3<f64>, options: &BlockOptions) -> Result<RgbImage, RenderError> {
+    if !sides.iter().all(|side| side.is_finite() && *side > 0.0) {
+        return Err(RenderError::Sides { sides: sides.into() });
+    }
+    let middle = 0.5 * sides;
+    let block = TriangleMesh::cuboid(sides.into()).mapped(|p| Point3::from(p.coords + middle));
+    render_mesh(&block, colour, &options.camera, &options.picture)
+}

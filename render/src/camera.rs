@@ -1,0 +1,143 @@
+//! Where the picture is taken from.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+/// A camera that looks at the middle of the object.
+///
+/// ```
+/// use stereology_render::Camera;
+/// let from_above = Camera { elevation: 60.0, ..Camera::default() };
+/// assert!(from_above.distance.is_none()); // as near as shows all
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Degrees around the upright axis: at 0 the camera stands on the side of +z if y is up, of −y if z is up; at 90 on the side of +x.
+    pub azimuth: f64,
+    /// Degrees above the horizon, −89 to 89.
+    pub elevation: f64,
+    /// From the camera to the middle of the object, in its unit of length; `None`: as near as shows all of it.
+    pub distance: Option<f64>,
+    /// Angle of view across the shorter side of the picture, in degrees, 1 to 120; small angles look from afar.
+    pub field_of_view: f64,
+    /// The direction that is up in the picture; y in most mesh files, z in a solid.
+    pub up: UnitVector3<f64>,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self {
+            azimuth: 35.0,
+            elevation: 22.0,
+            distance: None,
+            field_of_view: 28.0,
+            up: Vector3::y_axis(),
+        }
+    }
+}
+
+/// A camera in its place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    pub(crate) eye: Point3<f64>,
+    pub(crate) forward: Vector3<f64>,
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    /// Half the shorter side of the picture at distance 1.
+    half: f64,
+    size: [f64; 2],
+}
+
+/// Share of the picture that the object may fill, each way.
+const FILL: f64 = 0.84;
+
+impl View {
+    /// Puts the camera so that all points are seen; they must not be empty.
+    pub(crate) fn new(camera: &Camera, points: &[Point3<f64>], [width, height]: [u32; 2]) -> Self {
+        let (azimuth, elevation) = (camera.azimuth.to_radians(), camera.elevation.to_radians());
+        // The direction to the camera at azimuth 0, and the one at 90 degrees.
+        let front = if camera.up.y.abs() > 0.9 {
+            Vector3::z()
+        } else {
+            -Vector3::y()
+        };
+        let front = (front - camera.up.dot(&front) * camera.up.into_inner()).normalize();
+        let side = camera.up.cross(&front);
+        let out =
+            elevation.cos() * (azimuth.cos() * front + azimuth.sin() * side) + elevation.sin() * camera.up.into_inner();
+        let forward = -out;
+        let right = forward.cross(&camera.up).normalize();
+        let up = right.cross(&forward);
+        let half = (0.5 * camera.field_of_view.to_radians()).tan();
+        let size = [f64::from(width), f64::from(height)];
+        let shorter = size[0].min(size[1]);
+        let room = [half * FILL * size[0] / shorter, half * FILL * size[1] / shorter];
+
+        let low = points.iter().fold(points[0], |low, p| low.inf(p));
+        let high = points.iter().fold(points[0], |high, p| high.sup(p));
+        let mut target = nalgebra::center(&low, &high);
+        let mut distance = camera.distance.unwrap_or(0.0);
+        if camera.distance.is_none() {
+            // Seen from `distance`, a point at (x, y) and `near` towards the camera needs |x| <= room (distance - near). The target moves across until both sides need the same.
+            let needs = |axis: &Vector3<f64>, room: f64| {
+                points.iter().fold([f64::NEG_INFINITY; 2], |needs, p| {
+                    let (across, near) = ((p - target).dot(axis), (p - target).dot(&out));
+                    [needs[0].max(near + across / room), needs[1].max(near - across / room)]
+                })
+            };
+            let (x, y) = (needs(&right, room[0]), needs(&up, room[1]));
+            let nearest = points
+                .iter()
+                .map(|p| (p - target).dot(&out))
+                .fold(f64::NEG_INFINITY, f64::max);
+            target += 0.5 * room[0] * (x[0] - x[1]) * right + 0.5 * room[1] * (y[0] - y[1]) * up;
+            // What is seen edge-on needs no room, but must not touch the camera.
+            let clear = nearest + 0.05 * (high - low).amax();
+            distance = (0.5 * (x[0] + x[1])).max(0.5 * (y[0] + y[1])).max(clear);
+        }
+        Self {
+            eye: target + distance * out,
+            forward,
+            right,
+            up,
+            half,
+            size,
+        }
+    }
+
+    /// Direction through a place of the picture, in pixels from its top left corner; not of length 1.
+    pub(crate) fn direction(&self, x: f64, y: f64) -> Vector3<f64> {
+        let shorter = 0.5 * self.size[0].min(self.size[1]) / self.half;
+        self.forward + (x - 0.5 * self.size[0]) / shorter * self.right - (y - 0.5 * self.size[1]) / shorter * self.up
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Camera, View};
+    use nalgebra::{Point3, Vector3};
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The automatic distance shows every point, within the share of the picture it may fill, and fills it one way.
+        #[test]
+        fn all_is_seen(
+            mut points in prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64).prop_map(Point3::from), 1..20),
+            azimuth in 0.0..360.0_f64, elevation in -80.0..80.0_f64, field_of_view in 5.0..90.0_f64, wide in 50_u32..200,
+        ) {
+            points.extend([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0], [-1.0, -1.0, -1.0]].map(Point3::from));
+            let camera = Camera { azimuth, elevation, field_of_view, ..Camera::default() };
+            let view = View::new(&camera, &points, [wide, 100]);
+            let mut fill = 0.0_f64;
+            for p in &points {
+                let to = p - view.eye;
+                let depth = to.dot(&view.forward);
+                prop_assert!(depth > 0.0);
+                let centre: Vector3<f64> = view.direction(f64::from(wide) / 2.0, 50.0);
+                prop_assert!((centre - view.forward).norm() < 1e-12);
+                let half = [view.half * view.size[0] / view.size[0].min(100.0), view.half * 100.0 / view.size[0].min(100.0)];
+                fill = fill.max(to.dot(&view.right).abs() / depth / half[0]).max(to.dot(&view.up).abs() / depth / half[1]);
+            }
+            prop_assert!(fill < 0.85 && fill > 0.7, "{fill}");
+        }
+    }
+}

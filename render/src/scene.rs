@@ -1,0 +1,267 @@
+//! The mesh as rays meet it: bounding volumes, hits, smooth normals.
+
+use bvh::aabb::{Aabb, Bounded};
+use bvh::bounding_hierarchy::BHShape;
+use bvh::bvh::{Bvh, BvhNode};
+use nalgebra::{Point3, Vector3};
+use stereology_shape::TriangleMesh;
+
+/// Faces that meet at less than this angle are one smooth surface: 35°.
+const SMOOTH_COSINE: f64 = 0.82;
+
+/// A triangle mesh with what rays ask of it.
+pub(crate) struct Scene {
+    bvh: Bvh<f64, 3>,
+    corners: Vec<[Point3<f64>; 3]>,
+    /// Normals at the corners, smooth where the faces nearly agree.
+    normals: Vec<[Vector3<f64>; 3]>,
+}
+
+/// Where a ray meets the mesh.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hit {
+    pub(crate) distance: f64,
+    facet: usize,
+    /// Shares of the second and third corner.
+    u: f64,
+    v: f64,
+}
+
+/// The surface at a hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    pub(crate) point: Point3<f64>,
+    /// Smooth, towards where the ray came from.
+    pub(crate) normal: Vector3<f64>,
+    /// Where rays of light start: on the smooth surface that the facets stand for, or facets would shade themselves.
+    pub(crate) start: Point3<f64>,
+}
+
+struct Facet {
+    bounds: Aabb<f64, 3>,
+    node: usize,
+}
+
+impl Bounded<f64, 3> for Facet {
+    fn aabb(&self) -> Aabb<f64, 3> {
+        self.bounds
+    }
+}
+
+impl BHShape<f64, 3> for Facet {
+    fn set_bh_node_index(&mut self, index: usize) {
+        self.node = index;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
+
+impl Scene {
+    /// Of triangles whose indices and coordinates have been checked; at least one.
+    pub(crate) fn new(mesh: &TriangleMesh) -> Self {
+        let corners: Vec<[Point3<f64>; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| mesh.vertices[i as usize]))
+            .collect();
+        let mut facets: Vec<Facet> = corners
+            .iter()
+            .map(|[a, b, c]| Facet {
+                bounds: Aabb::with_bounds(a.inf(b).inf(c), a.sup(b).sup(c)),
+                node: 0,
+            })
+            .collect();
+        let bvh = Bvh::build(&mut facets);
+        let normals = smooth_normals(mesh, &corners);
+        Self { bvh, corners, normals }
+    }
+
+    /// The first hit nearer than `far`.
+    pub(crate) fn first_hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>, far: f64) -> Option<Hit> {
+        let mut nearest: Option<Hit> = None;
+        self.visit(origin, direction, far, |facet, far| {
+            let hit = self.meet(facet, origin, direction).filter(|hit| hit.distance < far);
+            if let Some(hit) = hit {
+                nearest = Some(hit);
+                return Some(hit.distance);
+            }
+            Some(far)
+        });
+        nearest
+    }
+
+    /// Whether anything is in the way.
+    pub(crate) fn is_hidden(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> bool {
+        let mut hidden = false;
+        self.visit(origin, direction, f64::INFINITY, |facet, far| {
+            hidden = self.meet(facet, origin, direction).is_some();
+            if hidden { None } else { Some(far) }
+        });
+        hidden
+    }
+
+    /// Visits the facets whose boxes the ray meets, near boxes first; `visit` returns how far it still wants to look, or `None` to end.
+    fn visit(
+        &self,
+        origin: &Point3<f64>,
+        direction: &Vector3<f64>,
+        mut far: f64,
+        mut visit: impl FnMut(usize, f64) -> Option<f64>,
+    ) {
+        let inverse = direction.map(f64::recip);
+        let mut stack = Vec::with_capacity(64);
+        stack.push((0, 0.0));
+        while let Some((index, near)) = stack.pop() {
+            if near > far {
+                continue;
+            }
+            match &self.bvh.nodes[index] {
+                BvhNode::Leaf { shape_index, .. } => match visit(*shape_index, far) {
+                    Some(wanted) => far = wanted,
+                    None => return,
+                },
+                BvhNode::Node {
+                    child_l_index,
+                    child_l_aabb,
+                    child_r_index,
+                    child_r_aabb,
+                    ..
+                } => {
+                    let left = entry(child_l_aabb, origin, &inverse).map(|near| (*child_l_index, near));
+                    let right = entry(child_r_aabb, origin, &inverse).map(|near| (*child_r_index, near));
+                    let (first, second) = match (left, right) {
+                        (Some(l), Some(r)) if r.1 < l.1 => (Some(r), Some(l)),
+                        other => other,
+                    };
+                    stack.extend(second.into_iter().chain(first).filter(|(_, near)| *near <= far));
+                }
+            }
+        }
+    }
+
+    /// Where a ray meets a facet from either side (Möller and Trumbore 1997).
+    fn meet(&self, facet: usize, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
+        let [a, b, c] = &self.corners[facet];
+        let (ab, ac) = (b - a, c - a);
+        let p = direction.cross(&ac);
+        let inverse = ab.dot(&p).recip();
+        let s = origin - a;
+        let u = s.dot(&p) * inverse;
+        let q = s.cross(&ab);
+        let v = direction.dot(&q) * inverse;
+        let distance = ac.dot(&q) * inverse;
+        // Comparisons with what is no number, of a ray along the facet, are false.
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(Hit { distance, facet, u, v })
+    }
+
+    /// The surface where a ray from `origin` hit it.
+    pub(crate) fn surface(&self, hit: &Hit, direction: &Vector3<f64>) -> Surface {
+        let corners = &self.corners[hit.facet];
+        let shares = [1.0 - hit.u - hit.v, hit.u, hit.v];
+        let point = Point3::from((0..3).map(|i| shares[i] * corners[i].coords).sum::<Vector3<f64>>());
+        let flat = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let side = if flat.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let normals = self.normals[hit.facet].map(|normal| side * normal);
+        let smooth = (0..3).map(|i| shares[i] * normals[i]).sum::<Vector3<f64>>();
+        // Where the smooth normal turns away from the viewer, the facet's own is nearer to the truth.
+        let normal = smooth
+            .try_normalize(1e-12)
+            .filter(|n| n.dot(direction) < 0.0)
+            .unwrap_or(side * flat.normalize());
+        // Hanika 2021: lift the point to the planes through the corners across their normals.
+        let lift = |i: usize| {
+            let below = (point - corners[i]).dot(&normals[i]).min(0.0);
+            -shares[i] * below * normals[i]
+        };
+        Surface {
+            point,
+            normal,
+            start: point + lift(0) + lift(1) + lift(2),
+        }
+    }
+}
+
+/// Where a ray enters a box, at 0 if it starts inside; `None` if it misses.
+fn entry(bounds: &Aabb<f64, 3>, origin: &Point3<f64>, inverse: &Vector3<f64>) -> Option<f64> {
+    let (mut near, mut far) = (0.0_f64, f64::INFINITY);
+    for k in 0..3 {
+        let low = (bounds.min[k] - origin[k]) * inverse[k];
+        let high = (bounds.max[k] - origin[k]) * inverse[k];
+        // f64::min and max pass over what is no number: a ray in the plane of a side counts as inside it.
+        near = near.max(low.min(high));
+        far = far.min(low.max(high));
+    }
+    // Rounding must not lose a box that is touched.
+    (near <= far * (1.0 + 1e-12)).then_some(near)
+}
+
+/// For each corner of each triangle the mean of the normals about its vertex that nearly agree with its own, weighted by their angles there.
+fn smooth_normals(mesh: &TriangleMesh, corners: &[[Point3<f64>; 3]]) -> Vec<[Vector3<f64>; 3]> {
+    let flat: Vec<Vector3<f64>> = corners
+        .iter()
+        .map(|[a, b, c]| {
+            (b - a)
+                .cross(&(c - a))
+                .try_normalize(0.0)
+                .unwrap_or_else(Vector3::zeros)
+        })
+        .collect();
+    let mut around = vec![Vec::new(); mesh.vertices.len()];
+    for (facet, triangle) in mesh.triangles.iter().enumerate() {
+        for (corner, &vertex) in triangle.iter().enumerate() {
+            let [to, left, right] = [0, 1, 2].map(|i| corners[facet][(corner + i) % 3]);
+            let angle = (left - to).angle(&(right - to));
+            around[vertex as usize].push((facet, angle));
+        }
+    }
+    mesh.triangles
+        .iter()
+        .zip(&flat)
+        .map(|(triangle, own)| {
+            triangle.map(|vertex| {
+                let agree = around[vertex as usize]
+                    .iter()
+                    .filter(|(facet, _)| flat[*facet].dot(own) >= SMOOTH_COSINE);
+                let sum = agree.fold(Vector3::zeros(), |sum, (facet, angle)| sum + *angle * flat[*facet]);
+                sum.try_normalize(1e-12).unwrap_or(*own)
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Scene;
+    use nalgebra::{Point3, Vector3};
+    use proptest::prelude::*;
+    use stereology_shape::TriangleMesh;
+
+    fn vector(reach: f64) -> impl Strategy<Value = Vector3<f64>> {
+        prop::array::uniform3(-reach..reach).prop_map(Vector3::from)
+    }
+
+    proptest! {
+        /// The hit found through the boxes is the nearest of all triangles, and lies on the ball within its facets' sagitta.
+        #[test]
+        fn the_first_hit_is_the_nearest(from in vector(3.0), to in vector(0.9), axis in 0_usize..4) {
+            let ball = TriangleMesh::icosphere(2.0, 3);
+            let scene = Scene::new(&ball);
+            let origin = Point3::from(from);
+            // Rays along an axis too: they lie in the planes of boxes.
+            let direction = if axis < 3 { Vector3::ith(axis, 1.0) } else { (to - from).normalize() };
+            let hits = (0..ball.triangles.len()).filter_map(|facet| scene.meet(facet, &origin, &direction));
+            let nearest = hits.map(|hit| hit.distance).fold(f64::INFINITY, f64::min);
+            let found = scene.first_hit(&origin, &direction, f64::INFINITY);
+            prop_assert_eq!(found.map_or(f64::INFINITY, |hit| hit.distance).to_bits(), nearest.to_bits());
+            prop_assert_eq!(scene.is_hidden(&origin, &direction), nearest.is_finite());
+            if let Some(hit) = found {
+                let surface = scene.surface(&hit, &direction);
+                prop_assert!((surface.point.coords.norm() - 1.0).abs() < 0.01);
+                prop_assert!(surface.normal.cross(&surface.point.coords).norm() < 0.03);
+                prop_assert!(surface.normal.dot(&direction) < 0.0);
+            }
+        }
+    }
+}

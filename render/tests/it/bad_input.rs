@@ -1,0 +1,94 @@
+//! What cannot be shown is refused with a reason.
+
+use nalgebra::{Point3, Vector3};
+use stereology_render::{BlockOptions, Camera, RenderError, RenderOptions, render_block, render_mesh};
+use stereology_shape::TriangleMesh;
+
+fn refused(mesh: &TriangleMesh, camera: Camera, options: RenderOptions) -> RenderError {
+    render_mesh(mesh, &|_| [0.5; 3], &camera, &options).unwrap_err()
+}
+
+#[test]
+fn broken_meshes() {
+    let small = RenderOptions::default().with_size(8, 8);
+    let refused = |mesh: &TriangleMesh| refused(mesh, Camera::default(), small);
+    let cube = TriangleMesh::cuboid([1.0; 3]);
+    assert_eq!(refused(&TriangleMesh::default()), RenderError::Empty);
+    let mut beyond = cube.clone();
+    beyond.triangles[3][1] = 99;
+    assert_eq!(
+        refused(&beyond),
+        RenderError::Index {
+            triangle: 3,
+            vertices: 8
+        }
+    );
+    for bad in [f64::NAN, f64::INFINITY, 1e200] {
+        let mut mesh = cube.clone();
+        mesh.vertices[5].y = bad;
+        assert_eq!(refused(&mesh), RenderError::Vertices { vertex: Some(5) });
+    }
+    assert_eq!(
+        refused(&cube.mapped(|_| Point3::origin())),
+        RenderError::Vertices { vertex: None }
+    );
+}
+
+/// Open meshes and triangles without area are shown as far as they can be.
+#[test]
+fn poor_meshes_are_shown() {
+    let small = RenderOptions::default().with_size(16, 16);
+    let mut poor = TriangleMesh::cuboid([1.0; 3]);
+    poor.triangles.truncate(7);
+    poor.triangles.push([0, 0, 0]);
+    poor.triangles.push([0, 1, 1]);
+    assert!(render_mesh(&poor, &|_| [f32::NAN, 2.0, -1.0], &Camera::default(), &small).is_ok());
+    for size in [1e-30, 1e30] {
+        assert!(render_mesh(&poor.mapped(|p| p * size), &|_| [0.5; 3], &Camera::default(), &small).is_ok());
+    }
+}
+
+#[test]
+fn impossible_options() {
+    let cube = TriangleMesh::cuboid([1.0; 3]);
+    let (camera, options) = (Camera::default(), RenderOptions::default());
+    for (camera, options) in [
+        (
+            Camera {
+                elevation: 90.0,
+                ..camera
+            },
+            options,
+        ),
+        (
+            Camera {
+                azimuth: f64::NAN,
+                ..camera
+            },
+            options,
+        ),
+        (
+            Camera {
+                field_of_view: 0.0,
+                ..camera
+            },
+            options,
+        ),
+        (
+            Camera {
+                distance: Some(-1.0),
+                ..camera
+            },
+            options,
+        ),
+        (camera, options.with_size(0, 5)),
+        (camera, options.with_size(u32::MAX, u32::MAX)),
+        (camera, options.with_samples(0)),
+        (camera, RenderOptions { gloss: 2.0, ..options }),
+    ] {
+        assert!(matches!(refused(&cube, camera, options), RenderError::Options { .. }));
+    }
+    let sides = Vector3::new(1.0, 0.0, 1.0);
+    let refused = render_block(&|_| [0.5; 3], sides, &BlockOptions::default());
+    assert!(matches!(refused, Err(RenderError::Sides { .. })));
+}

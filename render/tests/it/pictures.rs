@@ -1,0 +1,152 @@
+//! What a picture must show, whatever it shows.
+
+use image::RgbImage;
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+use stereology_render::{
+    BlockOptions, Camera, RenderError, RenderOptions, render_block, render_mesh, render_mesh_with_progress,
+};
+use stereology_shape::TriangleMesh;
+
+const FLOATING: RenderOptions = RenderOptions {
+    width: 120,
+    height: 90,
+    samples: 2,
+    background: [0.0; 3],
+    ground: false,
+    gloss: 0.0,
+};
+
+fn bright_pixels(picture: &RgbImage) -> f64 {
+    // A pixel on the rim is partly background; the object is brighter than half of the scale.
+    picture.pixels().filter(|p| p.0[0] > 90).count() as f64
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// A ball of radius R at distance d is seen as a disc of radius R / √(d² − R²) at distance 1, wherever the camera stands.
+    #[test]
+    fn a_ball_is_a_disc(azimuth in -180.0..180.0_f64, elevation in -80.0..80.0_f64, distance in 3.0..9.0_f64, up_is_z in any::<bool>()) {
+        let ball = TriangleMesh::icosphere(2.0, 4);
+        let up = if up_is_z { Vector3::z_axis() } else { Vector3::y_axis() };
+        let camera = Camera { azimuth, elevation, distance: Some(distance), field_of_view: 50.0, up };
+        let picture = render_mesh(&ball, &|_| [1.0; 3], &camera, &FLOATING).unwrap();
+        let radius = 45.0 / 25.0_f64.to_radians().tan() / (distance * distance - 1.0).sqrt();
+        let disc = PI * radius * radius;
+        // The rim's pixels, 2π radius, are more or less bright; the icosphere is 0.3 % smaller than the ball.
+        prop_assert!((bright_pixels(&picture) - disc).abs() < 0.006 * disc + 1.0 * PI * radius);
+    }
+}
+
+/// Three faces are seen, each with the colour of the place asked for, the top in its own colour, the sides darker.
+#[test]
+fn a_block_shows_three_faces() {
+    let sides = Vector3::new(2.0, 3.0, 1.5);
+    let faces = |p: &Point3<f64>| {
+        assert!((0..3).all(|k| (-1e-9..=sides[k] + 1e-9).contains(&p[k])), "{p}");
+        if p.z > sides.z - 1e-9 {
+            [1.0, 0.0, 0.0]
+        } else if p.y < 1e-9 {
+            [0.0, 1.0, 0.0]
+        } else {
+            [0.0, 0.0, 1.0]
+        }
+    };
+    let picture = render_block(&faces, sides, &BlockOptions::default().with_size(160, 120)).unwrap();
+    let most = |channel: usize| {
+        let others = [(channel + 1) % 3, (channel + 2) % 3];
+        let own = picture.pixels().filter(|p| others.iter().all(|&c| p.0[c] == 0));
+        own.fold((0, 0_u8), |(count, most), p| (count + 1, most.max(p.0[channel])))
+    };
+    let [top, front, side] = [0, 1, 2].map(most);
+    assert!(
+        top.0 > 1000 && front.0 > 1000 && side.0 > 1000,
+        "{top:?} {front:?} {side:?}"
+    );
+    assert!(
+        top.1 >= 253 && front.1 < 245 && side.1 < front.1,
+        "{top:?} {front:?} {side:?}"
+    );
+}
+
+/// The floor of a pit sees less sky than a table.
+#[test]
+fn hollows_are_darker() {
+    let slab = |low: [f64; 3], high: [f64; 3]| {
+        let (low, high) = (Vector3::from(low), Vector3::from(high));
+        TriangleMesh::cuboid((high - low).into()).mapped(|p| p + 0.5 * (low + high))
+    };
+    let table = slab([-3.0, -3.0, -0.5], [3.0, 3.0, 0.0]);
+    let walls = [
+        slab([-3.0, 1.0, 0.0], [3.0, 1.2, 2.0]),
+        slab([-3.0, -1.2, 0.0], [3.0, -1.0, 2.0]),
+        slab([1.0, -1.0, 0.0], [1.2, 1.0, 2.0]),
+        slab([-1.2, -1.0, 0.0], [-1.0, 1.0, 2.0]),
+    ];
+    let pit = walls.iter().fold(table.clone(), TriangleMesh::with);
+    let camera = Camera {
+        elevation: 89.0,
+        distance: Some(12.0),
+        up: Vector3::z_axis(),
+        ..Camera::default()
+    };
+    let middle = |mesh| {
+        render_mesh(mesh, &|_| [0.7; 3], &camera, &FLOATING)
+            .unwrap()
+            .get_pixel(60, 45)
+            .0[0]
+    };
+    assert!(
+        middle(&table) >= 176 && middle(&pit) < 140,
+        "{} {}",
+        middle(&table),
+        middle(&pit)
+    );
+}
+
+#[test]
+fn bytes_do_not_depend_on_threads() {
+    let torus = TriangleMesh::torus(2.0, 0.7, 40, 20);
+    let stripes = |p: &Point3<f64>| {
+        if (9.0 * p.x).sin() > 0.0 {
+            [0.9, 0.8, 0.7]
+        } else {
+            [0.3, 0.2, 0.2]
+        }
+    };
+    let picture = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = RenderOptions::default().with_size(90, 70);
+        pool.install(|| render_mesh(&torus, &stripes, &Camera::default(), &options).unwrap())
+    };
+    assert!(picture(1) == picture(3));
+}
+
+/// A shadow falls on the ground, and far from the object the ground is the background.
+#[test]
+fn the_ground_shows_a_shadow_only() {
+    let ball = TriangleMesh::icosphere(2.0, 3);
+    let options = RenderOptions {
+        background: [0.9; 3],
+        ground: true,
+        ..FLOATING
+    };
+    let picture = render_mesh(&ball, &|_| [0.9, 0.0, 0.0], &Camera::default(), &options).unwrap();
+    let ground = picture.pixels().filter(|p| p.0[0] == p.0[1]);
+    let darkest = ground.map(|p| p.0[0]).min().unwrap();
+    assert!(darkest < 190, "{darkest}");
+    for (x, y) in [(0, 0), (119, 0)] {
+        assert!(picture.get_pixel(x, y).0[0].abs_diff(230) <= 1);
+    }
+}
+
+#[test]
+fn a_picture_can_be_broken_off() {
+    let ball = TriangleMesh::icosphere(1.0, 1);
+    let stop = |_| ControlFlow::Break(());
+    let broken = render_mesh_with_progress(&ball, &|_| [0.5; 3], &Camera::default(), &FLOATING, &stop);
+    assert_eq!(broken.unwrap_err(), RenderError::Cancelled);
+}

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use serde_json::{Map, Value, json};
 
 use crate::arguments::Everywhere;
-use crate::warnings::Warning;
+use crate::warnings::{self, Warning};
 
 /// The answer of one command.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ impl Answer {
         object.insert("schema".to_owned(), json!(format!("stereology.{}/1", self.command)));
         object.insert(
             "warnings".to_owned(),
-            self.warnings.iter().map(Warning::to_json).collect(),
+            self.warnings.iter().map(warnings::to_json).collect(),
         );
         object.extend(self.fields.clone());
         Value::Object(object)
@@ -84,8 +84,8 @@ impl Answer {
                 out.push('\n');
             }
             for warning in &self.warnings {
-                out.push_str(&format!("warning [{}]: {}\n", warning.code(), warning.message()));
-                if let Some(advice) = warning.advice() {
+                out.push_str(&format!("warning [{}]: {}\n", warning.code, warning.message));
+                if let Some(advice) = warnings::advice(warning) {
                     out.push_str(&format!("  {advice}\n"));
                 }
             }

@@ -3,6 +3,8 @@
 use std::fmt::{self, Display};
 use std::path::Path;
 
+use stereology::shape::{Body, BodyError};
+
 /// Why a command stopped, and the code the program exits with.
 #[derive(Debug)]
 pub struct Failure {
@@ -52,6 +54,14 @@ impl Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
     }
+}
+
+/// A body from its description; a description that is none is wrong usage, a mesh that cannot be used a failed run.
+pub fn body(spec: &str) -> Result<Body, Failure> {
+    Body::parse(spec).map_err(|error| match error {
+        BodyError::Length { .. } | BodyError::Numbers { .. } | BodyError::UnknownShape { .. } => Failure::usage(error),
+        other => Failure::run(other),
+    })
 }
 
 /// Says of an error which file it is about, or that it is the user's to mend.

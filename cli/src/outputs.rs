@@ -5,7 +5,10 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use serde_json::Value;
+use stereology::grid::write_atomically;
 
 use crate::failure::{Explain, Failure};
 
@@ -35,17 +38,22 @@ pub fn check_file(path: &Path, force: bool) -> Result<(), Failure> {
 
 /// Writes a text file whole or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
-    let partial = with_suffix(path, ".partial");
-    let write = || {
-        let mut file = fs::File::create(&partial)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(&partial, path)
-    };
-    write()
-        .inspect_err(|_| drop(fs::remove_file(&partial)))
-        .map_err(|error| format!("cannot be written ({error}); is the folder writable and the disk not full?"))
-        .at(path)
+    write_atomically(path, |out| out.write_all(text.as_bytes())).at(path)
+}
+
+/// Writes a PNG whole or not at all.
+pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Failure> {
+    write_atomically(path, |out| {
+        PngEncoder::new(out)
+            .write_image(
+                picture.as_raw(),
+                picture.width(),
+                picture.height(),
+                ExtendedColorType::Rgb8,
+            )
+            .map_err(std::io::Error::other)
+    })
+    .at(path)
 }
 
 /// Writes indented JSON whole or not at all.

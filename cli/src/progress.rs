@@ -49,7 +49,7 @@ impl Step {
             };
         }
         let bar = ProgressBar::new(1000);
-        if let Ok(style) = ProgressStyle::with_template("{prefix:12} {bar:40} {percent:>3} % {elapsed:>4} {msg}") {
+        if let Ok(style) = ProgressStyle::with_template("{prefix:12} {bar:40} {percent:>3} % {elapsed:>4}") {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_owned());
@@ -65,11 +65,6 @@ impl Step {
         } else {
             ControlFlow::Continue(())
         }
-    }
-
-    /// Says below the bar what is being done.
-    pub fn say(&self, message: &str) {
-        self.bar.set_message(message.to_owned());
     }
 }
 

@@ -1,13 +1,14 @@
 //! The warnings the program can give: fixed codes, what each means, and what to do about it.
 
 use serde_json::{Value, json};
+pub use stereology::pipeline::Warning;
 
 /// Every code, in alphabetical order: (code, what it means, what to do). `docs/cli.md` and the report show this table.
 pub const CODES: &[(&str, &str, &str)] = &[
     (
-        "clamped-bins",
-        "Some unfolded number densities came out negative and were set to zero.",
-        "Use fewer bins, more photographs, or --method em, which stays positive by construction.",
+        "box-rounded",
+        "The box's side was rounded to a whole number of periods of the texture, so that the solid repeats.",
+        "Nothing, unless you need exactly that side: then choose --box as a multiple of the texture's period.",
     ),
     (
         "clipped-labels",
@@ -15,24 +16,34 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Save the labels with more bits (u16 or u32) and import them again.",
     ),
     (
+        "constant-exemplar",
+        "The picture whose texture was asked for has one colour where it counts: there is no texture.",
+        "Nothing, if the material is that smooth; otherwise look at the picture.",
+    ),
+    (
         "edge-heavy",
         "Many profiles touch the edge of the photograph.",
         "Take a photograph of a larger area: it should be at least ten times as wide as the largest profile.",
     ),
     (
-        "far-mean-colour",
-        "The mean colour of the solid's sections differs visibly from the photograph's.",
-        "Look at means.png: are all the colours there? Try more --categories or import a label map.",
+        "few-profiles",
+        "There are few profiles: every figure that follows from them is uncertain.",
+        "Use a photograph of a larger area, or fewer --bins.",
     ),
     (
-        "few-profiles",
-        "There are fewer than 50 profiles: every figure that follows from them is uncertain.",
-        "Use a photograph of a larger area, or fewer --bins.",
+        "few-profiles-in-bin",
+        "Some size bins hold fewer than five profiles: their densities are uncertain.",
+        "Use fewer --bins, or photographs of a larger area.",
+    ),
+    (
+        "few-samples",
+        "Too few pixels lie inside particles (or binder) to take the texture's coarse statistics from.",
+        "Nothing for fine textures; otherwise a photograph of higher resolution, or fewer --levels.",
     ),
     (
         "fines-left-out",
         "The smallest sizes were left out of the packing, to keep the number of particles feasible.",
-        "Raise --min-area, or give a smaller --box.",
+        "Give a smaller --box, or raise --min-size if they are not needed.",
     ),
     (
         "fraction-mismatch",
@@ -40,14 +51,9 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
     ),
     (
-        "gaps-in-bins",
-        "Some size bins hold no profile at all.",
-        "Use fewer --bins.",
-    ),
-    (
-        "ill-conditioned",
-        "The kernel is nearly singular: small errors of the counts become large errors of the densities.",
-        "Use fewer --bins, or --method em.",
+        "levels-reduced",
+        "The pyramid has fewer levels than asked for: the picture or the result is too small.",
+        "Use a larger picture, or fewer --levels.",
     ),
     (
         "mesh-repaired",
@@ -60,19 +66,39 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Use a photograph of higher resolution; the sizes below the threshold are not reported.",
     ),
     (
+        "negative-bins",
+        "Some unfolded number densities came out negative and were set to zero.",
+        "Use fewer --bins, photographs of a larger area, or --method em, which stays positive by construction.",
+    ),
+    (
         "no-binder",
         "No single colour surrounds the particles: what is particle and what is binder is a guess.",
         "Give the binder's colour with --binder R,G,B, or import a label map with --labels FILE.",
     ),
     (
-        "poor-fit",
-        "The refolded profiles do not fit the observed ones: the model does not explain the photograph.",
-        "Try another --shape or several of them; look at the overlay for merged or broken profiles.",
+        "not-converged",
+        "The estimate was still changing when the iteration limit was reached.",
+        "Use fewer --bins, or --method nnls for comparison.",
     ),
     (
-        "size-mismatch",
-        "The profile sizes in sections of the solid differ from those of the photograph.",
-        "Look at the histograms: missing fines need a higher resolution, missing large sizes a larger photograph.",
+        "oscillating-bins",
+        "Densities of neighbouring bins swing up and down: the counts cannot carry so many bins.",
+        "Use fewer --bins, or photographs of a larger area.",
+    ),
+    (
+        "paper-normalisation",
+        "The paper's normalisation counts one profile a hit, but planes through this body show more.",
+        "Leave --paper out for densities; use it to compare with the paper's figures.",
+    ),
+    (
+        "self-intersection",
+        "The mesh seems to cut through itself: sections show another number of profiles than its surface says.",
+        "Mend the mesh (a boolean union in a mesh editor).",
+    ),
+    (
+        "small-labels",
+        "Labels smaller than the smallest area that counts were left out.",
+        "Lower --min-area to keep them.",
     ),
     (
         "split-label",
@@ -80,55 +106,33 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Give each profile a label of its own if they are different particles.",
     ),
     (
-        "truncated-bins",
-        "Some bins lie below the smallest size that is counted: nothing can be said about them.",
-        "Use a photograph of higher resolution if you need them.",
+        "threshold-moved",
+        "The smallest size lies inside a profile bin, all of which was left out.",
+        "Nothing, or choose --edges with an edge at --min-size.",
+    ),
+    (
+        "types-ignored",
+        "Some profiles of the table have no type, so types were not used.",
+        "Fill the column `type` in every row, or remove it.",
     ),
     (
         "unstable-count",
-        "The number of profiles changes by more than 10 % when the thresholds move a little.",
+        "The number of profiles changes much when the thresholds move a little.",
         "Look at overlay.png; import a label map with --labels FILE if the particles are not outlined well.",
     ),
 ];
 
-/// Something the user should know before trusting the answer.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Warning {
-    code: String,
-    message: String,
+/// What to do about a warning.
+pub fn advice(warning: &Warning) -> Option<&'static str> {
+    CODES
+        .iter()
+        .find(|(code, ..)| *code == warning.code)
+        .map(|&(_, _, advice)| advice)
 }
 
-impl Warning {
-    /// A warning of one of the fixed [`CODES`].
-    pub fn new(code: impl Into<String>, message: impl Into<String>) -> Self {
-        Self {
-            code: code.into(),
-            message: message.into(),
-        }
-    }
-
-    /// The fixed code.
-    pub fn code(&self) -> &str {
-        &self.code
-    }
-
-    /// What was found, with its figures.
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-
-    /// What to do about it.
-    pub fn advice(&self) -> Option<&'static str> {
-        CODES
-            .iter()
-            .find(|(code, ..)| *code == self.code)
-            .map(|&(_, _, advice)| advice)
-    }
-
-    /// `{"code", "message"}`.
-    pub fn to_json(&self) -> Value {
-        json!({ "code": self.code, "message": self.message })
-    }
+/// `{"code", "message"}`.
+pub fn to_json(warning: &Warning) -> Value {
+    json!({ "code": warning.code, "message": warning.message })
 }
 
 #[cfg(test)]

@@ -3,16 +3,22 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use stereology::volume;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::commands::slice::open_solid;
+use crate::commands::texture::volume_format;
+use crate::failure::{Explain, Failure};
+use crate::outputs::check_file;
+use crate::progress::Step;
 use crate::values::count;
 
 /// Writes one period of a finished solid as voxels
 ///
 /// DIR is an output folder of `stereology synthesize`. N voxels along the box's longest side, of: rgb (colours, u8), id (particle number, u32, 0 = binder),
-/// category (u8), distance (signed distance to the nearest particle surface, f32, negative inside). All formats hold the same values of the same voxels; axes
+/// category (number of the colour category, u8,
+/// 0 = binder), distance (signed distance to the nearest particle surface, f32, negative inside). All formats hold the same values of the same voxels; axes
 /// are (z, y, x, channel).
 ///
 /// The file is written plane by plane, whatever its size; if it is killed FILE.partial stays.
@@ -43,17 +49,42 @@ pub enum Channel {
     Rgb,
     /// Number of the particle from 1, u32; 0 is binder
     Id,
-    /// Colour category of the particle, u8
+    /// Colour category of the particle from 1, u8; 0 is binder
     Category,
     /// Signed distance to the nearest particle surface, f32
     Distance,
 }
 
 impl Export {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         if self.resume {
             return Err(Failure::not_available("--resume"));
         }
-        Err(Failure::not_available("the command `export`"))
+        let format = volume_format(&self.output)?;
+        check_file(&self.output, everywhere.force)?;
+        let solid = open_solid(&self.solid)?.solid;
+        let (channel, name) = match self.channel {
+            Channel::Rgb => (volume::Channel::Rgb, "rgb"),
+            Channel::Id => (volume::Channel::Id, "id"),
+            Channel::Category => (volume::Channel::Category, "category"),
+            Channel::Distance => (volume::Channel::Distance, "distance"),
+        };
+        let step = Step::begin("voxels", everywhere.quiet);
+        solid
+            .write_voxels(&self.output, format, self.voxels, channel, &|done| step.at(done))
+            .at(&self.output)?;
+        drop(step);
+        let grid = solid.voxel_grid(self.voxels);
+        let [nx, ny, nz] = grid.counts;
+        let mut answer = Answer::new("export");
+        answer
+            .field("shape", vec![nz, ny, nx])
+            .field("spacing", grid.spacing.to_vec())
+            .field("channel", name)
+            .line(format!(
+                "{nx} x {ny} x {nz} voxels ({name}) written to {}",
+                self.output.display()
+            ));
+        Ok(answer)
     }
 }

@@ -1,11 +1,20 @@
 //! `stereology kmatrix`: the section law of a body.
 
 use clap::{Args, ValueEnum};
+use serde_json::json;
+use stereology::kmatrix::{MonteCarloOptions, SectionLaw, SectionOptions};
+use stereology::shape::Body;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::failure::{Explain, Failure, body};
+use crate::numbers::significant;
+use crate::progress::Step;
 use crate::values::{bins, count, positive};
+use crate::warnings::Warning;
+
+/// Random sections beyond which a tolerance is out of reach of --method monte-carlo.
+const MOST_SECTIONS: f64 = 2e7;
 
 /// How often a random plane shows a body of each size as a profile of each size
 ///
@@ -27,13 +36,13 @@ pub struct Kmatrix {
     /// Largest standard error of the matrix to stop at [default: 0.001]
     #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "directions")]
     pub tolerance: Option<f64>,
-    /// Number of directions, instead of a tolerance
+    /// Number of directions (with monte-carlo: of sections), instead of a tolerance
     #[arg(long, value_name = "N", value_parser = count)]
     pub directions: Option<usize>,
     /// Exact in depth for each direction, or the paper's random sections
     #[arg(long, value_enum, default_value_t = Method::Exact)]
     pub method: Method,
-    /// The paper's normalisation: profiles per particle hit are not counted (the same for convex bodies)
+    /// The paper's normalisation, `caliper` = mean caliper of the hull: counts one profile a hit (the same for convex bodies)
     #[arg(long)]
     pub paper: bool,
 }
@@ -48,7 +57,143 @@ pub enum Method {
 }
 
 impl Kmatrix {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `kmatrix`"))
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let body = body(&self.shape)?;
+        let law = self.law(&body, everywhere)?;
+        let matrix = law.k_matrix(self.bins);
+        let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let x: Vec<f64> = (1..=100).map(|i| f64::from(i) / 100.0).collect();
+        let f: Vec<f64> = x.iter().map(|&x| law.cdf(x)).collect();
+        let standard_error = law.standard_error(self.bins);
+        let caliper = if self.paper {
+            law.caliper_hull()
+        } else {
+            law.caliper_effective()
+        };
+        let mesh = body.mesh();
+
+        let mut answer = Answer::new("kmatrix");
+        answer
+            .field("shape", self.shape.as_str())
+            .field("triangles", mesh.map(|mesh| mesh.triangles().len()))
+            .field("volume", law.volume())
+            .field("surface_area", law.surface_area())
+            .field("caliper_hull", law.caliper_hull())
+            .field("caliper_effective", law.caliper_effective())
+            .field("profiles_per_hit", law.profiles_per_hit())
+            .field("max_area", law.max_area())
+            .field("normalisation", if self.paper { "paper" } else { "profiles" })
+            .field("caliper", caliper)
+            .field("bins", self.bins)
+            .field("matrix", rows.clone())
+            .field("standard_error", standard_error)
+            .field("cdf", json!({ "x": x, "f": f }))
+            .field("directions", law.directions())
+            .field("rotations", law.rotations());
+        let repairs: Vec<String> = mesh
+            .map_or(&[][..], |mesh| mesh.repairs())
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        if !repairs.is_empty() {
+            answer.warn(Warning::new(
+                "mesh-repaired",
+                format!("{}: {}", self.shape, repairs.join("; ")),
+            ));
+        }
+        answer.field("repairs", repairs);
+        self.warn(&body, &law, &mut answer);
+        self.describe(&law, &rows, &mut answer);
+        Ok(answer)
+    }
+
+    fn law(&self, body: &Body, everywhere: &Everywhere) -> Result<SectionLaw, Failure> {
+        let step = Step::begin("sections", everywhere.quiet);
+        let progress = |done: f64| step.at(done);
+        match self.method {
+            Method::Exact => {
+                let options = SectionOptions::default()
+                    .with_bins(self.bins)
+                    .with_seed(everywhere.seed);
+                let options = match (self.directions, self.tolerance) {
+                    (Some(directions), _) => options.with_directions(directions),
+                    (None, tolerance) => options.with_tolerance(tolerance.unwrap_or(1e-3)),
+                };
+                SectionLaw::of_body_with_progress(body, &options, &progress).or_fail()
+            }
+            Method::MonteCarlo => {
+                let mut options = MonteCarloOptions::default().with_seed(everywhere.seed);
+                if let Some(sections) = self.directions {
+                    options = options.with_iterations(sections);
+                }
+                loop {
+                    let law = SectionLaw::monte_carlo_with_progress(body, &options, &progress).or_fail()?;
+                    let (reached, asked) = (law.standard_error(self.bins), self.tolerance.unwrap_or(f64::INFINITY));
+                    if reached <= asked {
+                        return Ok(law);
+                    }
+                    // The error falls with the root of the number of sections; a little more, so that once is mostly enough.
+                    let needed = 1.1 * options.iterations as f64 * (reached / asked).powi(2);
+                    if needed > MOST_SECTIONS {
+                        return Err(Failure::run(format!(
+                            "--tolerance {asked} would need about {needed:.0} random sections; take a larger tolerance, or --method exact"
+                        )));
+                    }
+                    options = options.with_iterations(needed.ceil() as usize);
+                }
+            }
+        }
+    }
+
+    fn warn(&self, body: &Body, law: &SectionLaw, answer: &mut Answer) {
+        if self.method == Method::Exact && law.chi_discrepancy() > 6.1 && body.mesh().is_some() {
+            answer.warn(Warning::new(
+                "self-intersection",
+                format!("{}: sections show another number of profiles than the surface's curvature says; the mesh probably cuts through itself", self.shape),
+            ));
+        }
+        if self.paper && (law.profiles_per_hit() - 1.0).abs() > 0.005 {
+            answer.warn(Warning::new(
+                "paper-normalisation",
+                format!(
+                    "a plane that hits this body shows {} profiles on average; the paper's normalisation counts one, so densities come out that much too large",
+                    significant(law.profiles_per_hit())
+                ),
+            ));
+        }
+    }
+
+    fn describe(&self, law: &SectionLaw, rows: &[Vec<f64>], answer: &mut Answer) {
+        answer
+            .line(format!(
+                "{}: volume {}, surface {}",
+                self.shape,
+                significant(law.volume()),
+                significant(law.surface_area())
+            ))
+            .line(format!(
+                "mean caliper {} (effective {}), {} profiles a hit, largest section {}",
+                significant(law.caliper_hull()),
+                significant(law.caliper_effective()),
+                significant(law.profiles_per_hit()),
+                significant(law.max_area())
+            ))
+            .line(if law.directions() == 0 {
+                "closed form".to_owned()
+            } else {
+                format!(
+                    "standard error {} from {} directions",
+                    significant(law.standard_error(self.bins)),
+                    law.directions()
+                )
+            })
+            .line(format!(
+                "K, {} profile bins down, size bins across (x 1000):",
+                self.bins
+            ));
+        for row in rows {
+            let cells: Vec<String> = row.iter().map(|k| format!("{:5.0}", 1000.0 * k)).collect();
+            answer.line(cells.join(" "));
+        }
     }
 }

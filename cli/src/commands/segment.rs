@@ -1,13 +1,20 @@
 //! `stereology segment`: a photograph -> profiles.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use stereology::segment::{self, SegmentOptions, Segmentation, read_labels, read_photo, write_labels};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::failure::{Explain, Failure};
+use crate::numbers::{percent, significant};
+use crate::outputs::{OutputFolder, write_json, write_text};
+use crate::progress::{Step, go_on};
 use crate::values::{Colour, count, positive};
+use crate::warnings::Warning;
 
 /// Finds the profiles of particles on a photograph of a cut
 ///
@@ -15,7 +22,8 @@ use crate::values::{Colour, count, positive};
 /// A photograph without separable particles (no binder colour, or nothing in it) is refused or warned of: outline such particles with another tool and import
 /// its label map with --labels.
 ///
-/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge, weight), overlay.png (look at this first),
+/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category,
+/// touches_edge, weight; colours 0 to 255), overlay.png (look at this first),
 /// binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (its picture) and summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
@@ -75,8 +83,153 @@ pub enum EdgeRule {
     All,
 }
 
-impl Segment {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `segment`"))
+impl Choices {
+    /// The options of the segmentation; areas in pixels.
+    pub fn options(&self, seed: u64) -> SegmentOptions {
+        let mut options = SegmentOptions::default()
+            .with_seed(seed)
+            .with_holes(match self.holes {
+                Holes::Fill => segment::Holes::Fill,
+                Holes::Keep => segment::Holes::Keep,
+            })
+            .with_edge_rule(match self.edge_rule {
+                EdgeRule::Frame => segment::EdgeRule::Frame,
+                EdgeRule::MilesLantuejoul => segment::EdgeRule::MilesLantuejoul,
+                EdgeRule::All => segment::EdgeRule::All,
+            });
+        if let Some(Colour(rgb)) = self.binder {
+            options = options.with_binder(rgb.map(|channel| f64::from(channel) / 255.0));
+        }
+        if let Some(area) = self.min_area {
+            options = options.with_min_area(area.ceil() as usize);
+        }
+        if let Some(categories) = self.categories {
+            options = options.with_categories(categories);
+        }
+        options
     }
+}
+
+impl Segment {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let photo = read_photo(&self.photo).at(&self.photo)?;
+        let options = self.choices.options(everywhere.seed);
+        let step = Step::begin("segmenting", everywhere.quiet);
+        let found = match &self.choices.labels {
+            Some(labels) => Segmentation::from_labels(&photo, read_labels(labels).at(labels)?, &options).at(labels)?,
+            None => segment::segment(&photo, &options, &|done| step.at(done)).at(&self.photo)?,
+        };
+        drop(step);
+        go_on()?;
+        let mut answer = Answer::new("segment");
+        for (name, value) in figures(&found, everywhere.scale) {
+            answer.field(name, value);
+        }
+        for finding in &found.findings {
+            answer.warn(Warning::new(finding.code, finding.message.clone()));
+        }
+        let (window, scale) = (found.window, everywhere.scale);
+        let counted = found.profiles.iter().filter(|profile| profile.weight > 0.0).count();
+        answer
+            .line(format!(
+                "{} profiles found, {counted} of them counted by the edge rule",
+                found.profiles.len()
+            ))
+            .line(format!("area fraction      {}", percent(found.area_fraction)))
+            .line(format!(
+                "profiles per area  {}",
+                significant(found.number_per_area / (scale * scale))
+            ))
+            .line(format!(
+                "window             {} x {} pixels",
+                window.width, window.height
+            ))
+            .line(format!("colour categories  {}", found.categories.len()))
+            .line(format!(
+                "look at            {}",
+                self.output.join("overlay.png").display()
+            ));
+        write_files(&folder, &found, scale)?;
+        write_json(&folder.file("summary.json"), &answer.summary())?;
+        go_on()?;
+        folder.publish()?;
+        Ok(answer)
+    }
+}
+
+/// Fields of the summary, lengths times `scale`.
+pub fn figures(found: &Segmentation, scale: f64) -> Vec<(&'static str, Value)> {
+    let mean_size = |category: usize| {
+        let sizes: Vec<f64> = found
+            .profiles
+            .iter()
+            .filter(|p| usize::from(p.category) == category)
+            .map(|p| p.size * scale)
+            .collect();
+        sizes.iter().sum::<f64>() / sizes.len() as f64
+    };
+    let colours: Vec<Value> = found
+        .categories
+        .iter()
+        .enumerate()
+        .map(|(k, category)| {
+            json!({ "colour": category.colour.map(|c| 255.0 * c), "profiles": category.profiles, "mean_size": mean_size(k) })
+        })
+        .collect();
+    vec![
+        ("profiles", json!(found.profiles.len())),
+        ("area_fraction", json!(found.area_fraction)),
+        ("number_per_area", json!(found.number_per_area / (scale * scale))),
+        ("min_size", json!(found.min_size * scale)),
+        ("categories", json!(found.categories.len())),
+        (
+            "window",
+            json!({
+                "width": found.window.width as f64 * scale,
+                "height": found.window.height as f64 * scale,
+                "area": found.window.area * scale * scale,
+            }),
+        ),
+        (
+            "counted",
+            json!(found.profiles.iter().filter(|profile| profile.weight > 0.0).count()),
+        ),
+        ("binder", json!(found.binder.colour.map(|c| 255.0 * c))),
+        ("category_colours", json!(colours)),
+    ]
+}
+
+/// Writes all files of a segmentation but the summary, lengths times `scale`.
+pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64) -> Result<(), Failure> {
+    let labels = folder.file("labels.tif");
+    write_labels(&labels, found.labels.view()).at(&labels)?;
+    let mut table = String::from("id,x,y,area,size,r,g,b,category,touches_edge,weight\n");
+    for p in &found.profiles {
+        let [r, g, b] = p.colour.map(|c| 255.0 * c);
+        let _ = writeln!(
+            table,
+            "{},{},{},{},{},{r},{g},{b},{},{},{}",
+            p.id,
+            p.x * scale,
+            p.y * scale,
+            p.area * scale * scale,
+            p.size * scale,
+            p.category,
+            u8::from(p.touches_edge),
+            p.weight
+        );
+    }
+    write_text(&folder.file("profiles.csv"), &table)?;
+    for (name, picture) in [
+        ("overlay.png", found.overlay()),
+        ("binder.png", found.binder_picture()),
+        ("means.png", found.means()),
+        ("residual.png", found.residual_picture()),
+    ] {
+        let path = folder.file(name);
+        picture.save(&path).at(&path)?;
+    }
+    let residual = folder.file("residual.tif");
+    found.write_residual(&residual).at(&residual)
 }

@@ -1,18 +1,24 @@
 //! `stereology slice`: a picture of a cut through a solid.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
+use stereology::files::{self, SavedSolid};
+use stereology::volume::{self, SlicePlane};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::failure::{Explain, Failure};
+use crate::numbers::significant;
+use crate::outputs::{check_file, write_png};
+use crate::progress::go_on;
 use crate::values::{Triple, count, finite};
 
 /// Cuts a finished solid by a plane and writes the picture of the cut
 ///
 /// DIR is an output folder of `stereology synthesize`. The plane stands across an axis, --at a fraction of the box's side (0.3 is 30 %), or is any plane
-/// with a --normal at --offset from the origin along it.
+/// with a --normal at --offset from the origin along it. The picture shows one period of the solid.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology slice out --axis z --at 0.3 --size 512 -o cut.png")]
 pub struct Slice {
@@ -31,7 +37,7 @@ pub struct Slice {
     /// Distance of the plane from the origin along the normal [default: 0]
     #[arg(long, value_name = "D", value_parser = finite, allow_negative_numbers = true, requires = "normal")]
     pub offset: Option<f64>,
-    /// Width and height of the picture in pixels
+    /// Pixels along the longer side of the picture
     #[arg(long, value_name = "PX", default_value_t = 512, value_parser = count)]
     pub size: usize,
     /// File for the picture
@@ -48,7 +54,53 @@ pub enum Axis {
 }
 
 impl Slice {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `slice`"))
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        check_file(&self.output, everywhere.force)?;
+        let solid = open_solid(&self.solid)?.solid;
+        let sides = solid.period().sides();
+        let (plane, [across, down]) = match self.normal {
+            Some(Triple(normal)) => {
+                let plane =
+                    SlicePlane::oblique(Vector3::from(normal), self.offset.unwrap_or(0.0)).or_usage("--normal")?;
+                (plane, [sides.max(); 2])
+            }
+            None => {
+                let (axis, depth, extent) = match self.axis.unwrap_or(Axis::Z) {
+                    Axis::X => (volume::Axis::X, sides.x, [sides.y, sides.z]),
+                    Axis::Y => (volume::Axis::Y, sides.y, [sides.x, sides.z]),
+                    Axis::Z => (volume::Axis::Z, sides.z, [sides.x, sides.y]),
+                };
+                (SlicePlane::across(axis, self.at.unwrap_or(0.5) * depth), extent)
+            }
+        };
+        let pixel = across.max(down) / self.size as f64;
+        let pixels = |extent: f64| ((extent / pixel).round() as u32).max(1);
+        let picture = solid.slice(&plane, pixels(across), pixels(down), pixel).or_fail()?;
+        go_on()?;
+        write_png(&self.output, &picture)?;
+        let mut answer = Answer::new("slice");
+        answer
+            .field("width", picture.width())
+            .field("height", picture.height())
+            .field("pixel", pixel)
+            .line(format!(
+                "{} x {} pixels of edge {} written to {}",
+                picture.width(),
+                picture.height(),
+                significant(pixel),
+                self.output.display()
+            ));
+        Ok(answer)
     }
+}
+
+/// Opens a folder of `stereology synthesize`.
+pub fn open_solid(folder: &Path) -> Result<SavedSolid, Failure> {
+    if !folder.join("solid.json").is_file() {
+        return Err(Failure::run(format!(
+            "{}: holds no solid.json; give a folder written by `stereology synthesize`",
+            folder.display()
+        )));
+    }
+    files::open_solid(folder).at(folder)
 }

@@ -1,13 +1,25 @@
 //! `stereology texture`: Heeger-Bergen synthesis.
 
-use std::path::PathBuf;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use ndarray::{Array3, Axis};
+use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
+use stereology::pyramid::{
+    self, Exemplar, TextureOptions, synthesize_image_with_report, synthesize_volume_with_report,
+};
+use stereology::segment::read_photo;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::failure::{Explain, Failure};
+use crate::outputs::check_file;
+use crate::progress::{Step, go_on, stopped};
 use crate::values::{Extent, count};
+use crate::warnings::Warning;
 
 /// Makes a picture or a volume with the texture of a picture, of any size, that repeats without a seam
 ///
@@ -63,13 +75,182 @@ pub enum Mode {
     Volume,
 }
 
+impl Mode {
+    /// How the volume is made.
+    pub fn way(self) -> Result<pyramid::Mode, Failure> {
+        match self {
+            Self::Slices => Ok(pyramid::Mode::Slices),
+            Self::Spectrum => Ok(pyramid::Mode::Spectrum),
+            Self::Volume => Ok(pyramid::Mode::Volume),
+            Self::Oriented => Err(Failure::not_available(
+                "texture from one picture an axis (--mode oriented)",
+            )),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Slices => "slices",
+            Self::Oriented => "oriented",
+            Self::Spectrum => "spectrum",
+            Self::Volume => "volume",
+        }
+    }
+}
+
+impl Choices {
+    /// The options of the synthesis.
+    pub fn options(&self, mode: Mode, seed: u64) -> Result<TextureOptions, Failure> {
+        let options = TextureOptions::default()
+            .with_mode(mode.way()?)
+            .with_iterations(self.iterations)
+            .with_orientations(self.orientations)
+            .with_seed(seed);
+        Ok(match self.levels {
+            Some(levels) => options.with_levels(levels),
+            None => options,
+        })
+    }
+}
+
+/// What is made.
+enum Target {
+    Picture([usize; 2]),
+    Volume([usize; 3], Format),
+}
+
 impl Texture {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        if self.mode == Mode::Oriented || self.images.len() > 1 {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let options = self.choices.options(self.mode, everywhere.seed)?;
+        let [path] = &self.images[..] else {
             return Err(Failure::not_available(
                 "texture from one picture an axis (--mode oriented)",
             ));
+        };
+        let target = self.target()?;
+        check_file(&self.output, everywhere.force)?;
+        let picture = read_photo(path).at(path)?;
+        let exemplar = samples(&picture);
+        let exemplar = Exemplar::new(exemplar.view());
+        let step = Step::begin("texture", everywhere.quiet);
+        let progress = |done: f64| step.at(done);
+        let (shape, report) = match target {
+            Target::Picture(size) => {
+                let (made, report) = synthesize_image_with_report(&exemplar, size, &options, &progress).at(path)?;
+                go_on()?;
+                write_picture(&self.output, &made)?;
+                (made.shape().to_vec(), report)
+            }
+            Target::Volume(size, format) => {
+                let (made, report) = synthesize_volume_with_report(&exemplar, size, &options, &progress).at(path)?;
+                go_on()?;
+                let (nz, ny, nx, channels) = made.dim();
+                write_volume::<u8>(
+                    &self.output,
+                    format,
+                    VolumeShape { nz, ny, nx, channels },
+                    [everywhere.scale; 3],
+                    |z, mut slab| {
+                        slab.zip_mut_with(&made.index_axis(Axis(0), z), |byte, &value| *byte = stored(value));
+                        if stopped() {
+                            ControlFlow::Break(())
+                        } else {
+                            ControlFlow::Continue(())
+                        }
+                    },
+                )
+                .at(&self.output)?;
+                (made.shape().to_vec(), report)
+            }
+        };
+        let mut answer = Answer::new("texture");
+        answer
+            .line(format!(
+                "{} samples written to {}",
+                shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
+                self.output.display()
+            ))
+            .line(format!(
+                "mode {}, {} rounds, {} levels",
+                self.mode.name(),
+                self.choices.iterations,
+                report.levels
+            ))
+            .field("shape", shape)
+            .field("mode", self.mode.name())
+            .field("iterations", self.choices.iterations)
+            .field("levels", report.levels)
+            .field("orientations", self.choices.orientations)
+            .field("band_errors", report.band_errors);
+        for finding in &report.findings {
+            answer.warn(Warning::new(finding.code, finding.message.clone()));
         }
-        Err(Failure::not_available("the command `texture`"))
+        Ok(answer)
     }
+
+    fn target(&self) -> Result<Target, Failure> {
+        let is_picture = self
+            .output
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+        let wrong = |what: &str| {
+            Err(Failure::usage(format!(
+                "--size and -o {} do not fit: {what}",
+                self.output.display()
+            )))
+        };
+        match (&self.size.0[..], is_picture) {
+            (&[n], true) => Ok(Target::Picture([n, n])),
+            (&[height, width], true) => Ok(Target::Picture([height, width])),
+            (&[n], false) => Ok(Target::Volume([n; 3], volume_format(&self.output)?)),
+            (&[nz, ny, nx], false) => Ok(Target::Volume([nz, ny, nx], volume_format(&self.output)?)),
+            (&[_, _], false) => wrong("H,W makes a picture, so the file must end in .png"),
+            _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti or .tif"),
+        }
+    }
+}
+
+/// The format of a volume by the file's ending.
+pub fn volume_format(path: &Path) -> Result<Format, Failure> {
+    let ending = path
+        .extension()
+        .and_then(|extension| extension.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    match ending.as_str() {
+        "h5" | "hdf5" | "zarr" => Err(Failure::not_available(format!("the format .{ending}"))),
+        _ => Format::from_path(path).or_usage("-o"),
+    }
+}
+
+/// Values 0 to 1 of a picture (y, x, channel): one channel if it is grey all over.
+fn samples(picture: &RgbImage) -> Array3<f32> {
+    let grey = picture
+        .pixels()
+        .all(|pixel| pixel.0[0] == pixel.0[1] && pixel.0[1] == pixel.0[2]);
+    let channels = if grey { 1 } else { 3 };
+    Array3::from_shape_fn(
+        (picture.height() as usize, picture.width() as usize, channels),
+        |(y, x, channel)| f32::from(picture.get_pixel(x as u32, y as u32).0[channel]) / 255.0,
+    )
+}
+
+fn stored(value: f32) -> u8 {
+    (value * 255.0).round().clamp(0.0, 255.0) as u8
+}
+
+fn write_picture(path: &Path, made: &Array3<f32>) -> Result<(), Failure> {
+    let (height, width, channels) = made.dim();
+    let bytes: Vec<u8> = made.iter().map(|&value| stored(value)).collect();
+    let colour = if channels == 1 {
+        ExtendedColorType::L8
+    } else {
+        ExtendedColorType::Rgb8
+    };
+    write_atomically(path, |out| {
+        PngEncoder::new(out)
+            .write_image(&bytes, width as u32, height as u32, colour)
+            .map_err(std::io::Error::other)
+    })
+    .at(path)
 }

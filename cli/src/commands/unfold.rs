@@ -3,11 +3,24 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use stereology::files::DensityRows;
+use stereology::kmatrix::Sizes;
+use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+use stereology::unfold::{
+    self, Bootstrap, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, geometric_edges,
+    unfold_types_with_progress,
+};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
-use crate::values::{Edges, ShapeShare, bins, count, positive, share};
+use crate::failure::{Explain, Failure, body};
+use crate::numbers::{percent, significant};
+use crate::outputs::check_file;
+use crate::profile_table::{TableProfile, read_profiles};
+use crate::progress::{Step, go_on};
+use crate::values::{Edges, ShapeShare, bins, count, positive, share, shares};
+use crate::warnings::Warning;
 
 /// From the sizes of the profiles on a cut to the number and sizes of the particles in the solid
 ///
@@ -109,8 +122,350 @@ pub enum Kernel {
     UpperEdge,
 }
 
+impl Method {
+    /// The estimator; what is chosen automatically is `em`.
+    pub fn estimator(self) -> Result<unfold::Method, Failure> {
+        match self {
+            Self::Auto | Self::Em => Ok(unfold::Method::Em),
+            Self::Nnls => Ok(unfold::Method::Nnls),
+            Self::Paper => Ok(unfold::Method::Paper),
+            Self::Penalised => Err(Failure::not_available("--method penalised")),
+            Self::Ems => Err(Failure::not_available("--method ems")),
+        }
+    }
+}
+
+impl Choices {
+    /// Where in its bin a particle's size lies.
+    pub fn sizes(&self) -> Sizes {
+        match (self.kernel, self.method) {
+            (Some(Kernel::UpperEdge), _) | (None, Method::Paper) => Sizes::UpperEdge,
+            _ => Sizes::Integrated,
+        }
+    }
+
+    /// Name of the kernel.
+    pub fn kernel_name(&self) -> &'static str {
+        match self.sizes() {
+            Sizes::UpperEdge => "upper-edge",
+            Sizes::Integrated => "integrated",
+        }
+    }
+
+    /// The particle types; spheres if none are named.
+    pub fn types(&self) -> Result<ParticleTypes, Failure> {
+        types(&self.shape)
+    }
+
+    /// The estimator with its threshold and intervals; lengths of the options are multiplied by `scale`.
+    pub fn unfold_options(&self, scale: f64, seed: u64) -> Result<UnfoldOptions, Failure> {
+        let mut options = UnfoldOptions::default().with_method(self.method.estimator()?);
+        if let Some(min_size) = self.min_size {
+            options = options.with_min_size(min_size * scale);
+        }
+        if let Some(replicates) = self.bootstrap {
+            let mut bootstrap = Bootstrap {
+                replicates,
+                ..Bootstrap::default()
+            };
+            bootstrap.level = self.level;
+            bootstrap.seed = seed;
+            options = options.with_bootstrap(bootstrap);
+        }
+        Ok(options)
+    }
+
+    /// Edges of the size bins, for profiles of these sizes.
+    fn size_edges(&self, profiles: &[TableProfile], scale: f64) -> Result<Vec<f64>, Failure> {
+        if let Some(Edges(edges)) = &self.edges {
+            return Ok(edges.iter().map(|edge| edge * scale).collect());
+        }
+        let counted = || {
+            profiles
+                .iter()
+                .filter(|profile| profile.weight > 0.0)
+                .map(|profile| profile.size)
+        };
+        let largest = self
+            .max_size
+            .map_or_else(|| counted().fold(0.0, f64::max), |size| size * scale);
+        match self.spacing {
+            Spacing::Equal => Ok(equal_edges(largest, self.bins)),
+            Spacing::Geometric => {
+                // The first bin is everything up to the smallest size that is seen.
+                let smallest = self
+                    .min_size
+                    .map_or_else(|| counted().fold(f64::INFINITY, f64::min), |size| size * scale);
+                if self.bins < 2 || smallest.is_nan() || smallest >= largest {
+                    return Err(Failure::usage(
+                        "--spacing geometric needs two or more bins, and sizes that differ; give --min-size and --max-size, or --spacing equal",
+                    ));
+                }
+                Ok(geometric_edges(smallest, largest, self.bins - 1))
+            }
+        }
+    }
+}
+
+/// Particle types of `--shape` options; spheres if there are none.
+pub fn types(shapes: &[ShapeShare]) -> Result<ParticleTypes, Failure> {
+    let sphere = [ShapeShare {
+        shape: "sphere".to_owned(),
+        fraction: None,
+    }];
+    let shapes = if shapes.is_empty() { &sphere } else { shapes };
+    let shares = shares(shapes).or_usage("--shape")?;
+    let bodies = shapes
+        .iter()
+        .zip(shares)
+        .map(|(shape, share)| Ok((shape.shape.clone(), body(&shape.shape)?, share)))
+        .collect::<Result<_, Failure>>()?;
+    ParticleTypes::new(bodies).or_fail()
+}
+
+/// What was found, of one type or of several together.
+struct Found {
+    sum: Unfolding,
+    by_type: Vec<Unfolding>,
+    rows: DensityRows,
+}
+
 impl Unfold {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `unfold`"))
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        if let Some(output) = &self.output {
+            check_file(output, everywhere.force)?;
+        }
+        let choices = &self.choices;
+        let scale = everywhere.scale;
+        let options = choices.unfold_options(scale, everywhere.seed)?;
+        let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
+        profiles.iter_mut().for_each(|profile| profile.size *= scale);
+        let types = choices.types()?;
+        let edges = choices.size_edges(&profiles, scale)?;
+        let area = self.area * scale * scale;
+        let step = Step::begin("unfolding", everywhere.quiet);
+        let progress = |done: f64| step.at(done);
+
+        let labelled = types.types().len() > 1 && profiles.iter().all(|profile| profile.kind.is_some());
+        let found = if labelled {
+            self.labelled(&profiles, &types, &edges, area, &options, &progress)?
+        } else {
+            self.together(&profiles, &types, &edges, area, &options, &progress)?
+        };
+        drop(step);
+        go_on()?;
+        if let Some(output) = &self.output {
+            found.rows.write(output).at(output)?;
+        }
+        Ok(self.answer(&found, &profiles))
+    }
+
+    /// All types share one size distribution: eqs. (10)-(12).
+    fn together(
+        &self,
+        profiles: &[TableProfile],
+        types: &ParticleTypes,
+        edges: &[f64],
+        area: f64,
+        options: &UnfoldOptions,
+        progress: unfold::Progress<'_>,
+    ) -> Result<Found, Failure> {
+        if let Some(profile) = profiles
+            .iter()
+            .find(|profile| profile.kind.is_some_and(|kind| kind >= types.types().len()))
+        {
+            return Err(self.no_such_type(profile, types));
+        }
+        let measured = MeasuredProfiles {
+            sizes: profiles.iter().map(|profile| profile.size).collect(),
+            weights: profiles.iter().map(|profile| profile.weight).collect(),
+            categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
+            area,
+            min_size: 0.0,
+        };
+        let options = DensityOptions {
+            edges: Some(edges.to_vec()),
+            sizes: self.choices.sizes(),
+            unfold: *options,
+            ..DensityOptions::default()
+        };
+        let densities = particle_densities(&measured, types, &options, progress).at(&self.profiles)?;
+        let mut rows = DensityRows::default();
+        rows.unfolding(&densities.all, None, None);
+        if densities.by_category.len() > 1 {
+            for (category, density) in densities.by_category.iter().enumerate() {
+                rows.densities(edges, density, None, Some(category));
+            }
+        }
+        Ok(Found {
+            sum: densities.all,
+            by_type: Vec::new(),
+            rows,
+        })
+    }
+
+    /// Each type has its own profiles: eq. (9).
+    fn labelled(
+        &self,
+        profiles: &[TableProfile],
+        types: &ParticleTypes,
+        edges: &[f64],
+        area: f64,
+        options: &UnfoldOptions,
+        progress: unfold::Progress<'_>,
+    ) -> Result<Found, Failure> {
+        let mut parts = Vec::new();
+        for (kind, of) in types.types().iter().enumerate() {
+            let own = || profiles.iter().filter(|profile| profile.kind == Some(kind));
+            let sizes: Vec<f64> = own().map(|profile| profile.size).collect();
+            let weights: Vec<f64> = own().map(|profile| profile.weight).collect();
+            if weights.iter().sum::<f64>() <= 0.0 {
+                return Err(Failure::run(format!(
+                    "{}: no profile of type {kind} ({}) counts; leave that --shape out",
+                    self.profiles.display(),
+                    of.name
+                )));
+            }
+            let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), edges, area).at(&self.profiles)?;
+            parts.push((counts, of.kernel(edges, edges, self.choices.sizes()).or_fail()?));
+        }
+        if let Some(profile) = profiles
+            .iter()
+            .find(|profile| profile.kind.is_some_and(|kind| kind >= parts.len()))
+        {
+            return Err(self.no_such_type(profile, types));
+        }
+        let found = unfold_types_with_progress(&parts, options, progress).at(&self.profiles)?;
+        let mut sum = found.types[0].clone();
+        sum.number_density = found.number_density;
+        sum.intervals = found.intervals;
+        (sum.total, sum.mean_size, sum.volume_fraction) = (found.total, found.mean_size, found.volume_fraction);
+        (sum.observed, sum.refolded) = (found.observed, found.refolded);
+        for part in &found.types[1..] {
+            sum.profiles += part.profiles;
+            sum.deviance += part.deviance;
+            sum.degrees_of_freedom += part.degrees_of_freedom;
+            sum.condition_number = sum.condition_number.max(part.condition_number);
+            sum.clamped_bins.extend(&part.clamped_bins);
+            sum.findings.extend(part.findings.iter().cloned());
+        }
+        let mut rows = DensityRows::default();
+        rows.unfolding(&sum, None, None);
+        for (kind, part) in found.types.iter().enumerate() {
+            rows.unfolding(part, Some(kind), None);
+        }
+        Ok(Found {
+            sum,
+            by_type: found.types,
+            rows,
+        })
+    }
+
+    fn no_such_type(&self, profile: &TableProfile, types: &ParticleTypes) -> Failure {
+        Failure::run(format!(
+            "{}: a profile has type {}, but there are {} --shape (types are numbered from 0)",
+            self.profiles.display(),
+            profile.kind.unwrap_or(0),
+            types.types().len()
+        ))
+    }
+
+    fn answer(&self, found: &Found, profiles: &[TableProfile]) -> Answer {
+        let Found { sum, by_type, .. } = found;
+        let mut answer = Answer::new("unfold");
+        let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
+            let intervals = sum.intervals.as_ref()?;
+            Some(intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
+        };
+        answer
+            .field("edges", sum.edges.clone())
+            .field("number_density", sum.number_density.clone())
+            .field("lower", ends(|interval| interval.lower))
+            .field("upper", ends(|interval| interval.upper));
+        for (name, estimate) in [
+            ("total", sum.total),
+            ("mean_size", sum.mean_size),
+            ("volume_fraction", sum.volume_fraction),
+        ] {
+            answer.field(name, estimate.value);
+            if let Some(interval) = estimate.interval {
+                answer
+                    .field(&format!("{name}_lower"), interval.lower)
+                    .field(&format!("{name}_upper"), interval.upper);
+            }
+        }
+        if !by_type.is_empty() {
+            let names = self.choices.shape.iter().map(|shape| &shape.shape);
+            let types: Vec<Value> = names
+                .zip(by_type)
+                .map(|(shape, part)| json!({ "shape": shape, "number_density": part.number_density }))
+                .collect();
+            answer.field("types", types);
+        }
+        answer
+            .field("profiles", sum.profiles)
+            .field("observed", sum.observed.clone())
+            .field("refolded", sum.refolded.clone())
+            .field("deviance", sum.deviance)
+            .field("degrees_of_freedom", sum.degrees_of_freedom)
+            .field("condition_number", sum.condition_number)
+            .field("penalty", Value::Null)
+            .field("method", sum.method.name())
+            .field("kernel", self.choices.kernel_name())
+            .field("threshold", sum.threshold)
+            .field("clamped_bins", sum.clamped_bins.len());
+        for finding in &sum.findings {
+            answer.warn(Warning::new(finding.code(), finding.to_string()));
+        }
+        let unlabelled = profiles.iter().filter(|profile| profile.kind.is_none()).count();
+        if unlabelled > 0 && unlabelled < profiles.len() {
+            answer.warn(Warning::new(
+                "types-ignored",
+                format!(
+                    "{unlabelled} of {} profiles have no type, so types were not used",
+                    profiles.len()
+                ),
+            ));
+        }
+        let ranged = |estimate: Estimate, shown: fn(f64) -> String| match estimate.interval {
+            Some(Interval { lower, upper }) => {
+                format!("{} ({} to {})", shown(estimate.value), shown(lower), shown(upper))
+            }
+            None => shown(estimate.value),
+        };
+        answer
+            .line(format!(
+                "{} profiles, method {}, {} kernel",
+                sum.profiles,
+                sum.method.name(),
+                self.choices.kernel_name()
+            ))
+            .line(format!(
+                "particles per unit volume   {}",
+                ranged(sum.total, significant)
+            ))
+            .line(format!(
+                "mean size                   {}",
+                ranged(sum.mean_size, significant)
+            ))
+            .line(format!(
+                "volume fraction             {}",
+                ranged(sum.volume_fraction, percent)
+            ))
+            .line(format!(
+                "deviance                    {} for {} degrees of freedom",
+                significant(sum.deviance),
+                sum.degrees_of_freedom
+            ))
+            .line("size bin               particles per unit volume");
+        for (bin, density) in sum.edges.windows(2).zip(&sum.number_density) {
+            let density = density.map_or("unknown".to_owned(), significant);
+            answer.line(format!(
+                "({:>8}, {:>8}]   {density}",
+                significant(bin[0]),
+                significant(bin[1])
+            ));
+        }
+        answer
     }
 }

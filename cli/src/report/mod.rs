@@ -8,7 +8,7 @@ mod plots;
 mod trust;
 
 pub use page::page;
-pub use trust::{Check, Grade, Verdict, verdict};
+pub use trust::{Grade, Verdict, verdict};
 
 use image::RgbImage;
 

@@ -9,6 +9,7 @@ use super::{
 };
 use super::{pictures, plots, verdict};
 use crate::numbers::{counted, percent, significant};
+use crate::warnings::advice;
 
 /// The report as HTML.
 pub fn page(input: &ReportInput) -> String {
@@ -30,7 +31,7 @@ pub fn page(input: &ReportInput) -> String {
         },
     );
     trust(&mut html, input, &verdict);
-    warnings(&mut html, input);
+    all_warnings(&mut html, input);
     comparison(&mut html, &input.comparison, &input.photo);
     photograph(&mut html, &input.photo, &input.unit);
     sizes(&mut html, &input.sizes, &input.comparison, &input.unit);
@@ -138,7 +139,7 @@ fn class(grade: Grade) -> &'static str {
     }
 }
 
-fn warnings(html: &mut String, input: &ReportInput) {
+fn all_warnings(html: &mut String, input: &ReportInput) {
     html.push_str("<h2>Warnings</h2>\n");
     if input.warnings.is_empty() {
         html.push_str("<p>None.</p>\n");
@@ -146,15 +147,14 @@ fn warnings(html: &mut String, input: &ReportInput) {
     }
     html.push_str("<ul>\n");
     for warning in &input.warnings {
-        let advice = warning
-            .advice()
+        let to_do = advice(warning)
             .map(|advice| format!(" <em>{}</em>", escaped(advice)))
             .unwrap_or_default();
         let _ = writeln!(
             html,
-            "<li><code>{}</code> {}{advice}</li>",
-            escaped(warning.code()),
-            escaped(&sentence(warning.message()))
+            "<li><code>{}</code> {}{to_do}</li>",
+            escaped(&warning.code),
+            escaped(&sentence(&warning.message))
         );
     }
     html.push_str("</ul>\n");

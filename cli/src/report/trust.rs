@@ -64,7 +64,12 @@ const GUESSED: [&str; 1] = ["no-binder"];
 /// Checks the result.
 pub fn verdict(input: &ReportInput) -> Verdict {
     let (photo, sizes, packing, comparison) = (&input.photo, &input.sizes, &input.packing, &input.comparison);
-    let warned = |codes: &[&str]| input.warnings.iter().any(|warning| codes.contains(&warning.code()));
+    let warned = |codes: &[&str]| {
+        input
+            .warnings
+            .iter()
+            .any(|warning| codes.contains(&warning.code.as_str()))
+    };
     let off = |value: f64, reference: f64| (value / reference - 1.0).abs();
     let mut checks = vec![
         Check {

@@ -1,16 +1,6 @@
 //! Help, exit codes, and what is not built yet.
 
-use assert_cmd::Command;
-
-fn stereology(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("stereology")
-        .unwrap()
-        .args(arguments)
-        .output()
-        .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
-}
+use crate::stereology;
 
 #[test]
 fn help_teaches() {

@@ -1,0 +1,267 @@
+//! The steps one by one, on small data.
+
+use std::fs;
+
+use crate::{answer, path, stereology, write_discs};
+
+#[test]
+fn the_kernel_of_spheres_is_saltikovs() {
+    let found = answer(&["kmatrix", "sphere", "--bins", "4"]);
+    let root = |j: f64, i: f64| (j * j - i * i).sqrt();
+    for (i, row) in found["matrix"].as_array().unwrap().iter().enumerate() {
+        for (j, k) in row.as_array().unwrap().iter().enumerate() {
+            let (i, j) = ((i + 1) as f64, (j + 1) as f64);
+            let expected = if j < i {
+                0.0
+            } else {
+                (root(j, i - 1.0) - root(j, i)) / 4.0
+            };
+            assert!((k.as_f64().unwrap() - expected).abs() < 1e-14);
+        }
+    }
+    assert_eq!(found["cdf"]["x"].as_array().unwrap().len(), 100);
+    let cube = answer(&["kmatrix", "box:1,1,1", "--tolerance", "0.01"]);
+    assert!((cube["caliper_hull"].as_f64().unwrap() - 1.5).abs() < 1e-9);
+    assert!(cube["standard_error"].as_f64().unwrap() <= 0.01 && cube["triangles"] == 12);
+}
+
+#[test]
+fn profiles_of_one_size_of_sphere() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = path(&folder, "profiles.csv");
+    // Spheres of diameter 1 cut at evenly spaced depths: N_A = D N_V.
+    let sizes: Vec<String> = (0..400)
+        .map(|k| 2.0 * (0.25 - ((f64::from(k) + 0.5) / 800.0_f64).powi(2)).sqrt())
+        .map(|d| d.to_string())
+        .collect();
+    fs::write(&table, format!("size\n{}\n", sizes.join("\n"))).unwrap();
+    let found = answer(&[
+        "unfold",
+        &table,
+        "--area",
+        "200",
+        "--bins",
+        "10",
+        "--max-size",
+        "1",
+        "--kernel",
+        "upper-edge",
+        "--bootstrap",
+        "50",
+    ]);
+    let number = |name: &str| found[name].as_f64().unwrap();
+    assert!((number("total") - 2.0).abs() < 0.05 && (number("mean_size") - 1.0).abs() < 0.05);
+    assert!(number("total_lower") < 2.0 && 2.0 < number("total_upper"));
+    assert_eq!(
+        (
+            found["edges"].as_array().unwrap().len(),
+            found["profiles"].as_u64().unwrap()
+        ),
+        (11, 400)
+    );
+
+    // Twice the unit of length: an eighth of the density.
+    let scaled = answer(&[
+        "unfold",
+        &table,
+        "--area",
+        "200",
+        "--max-size",
+        "1",
+        "--kernel",
+        "upper-edge",
+        "--scale",
+        "2",
+    ]);
+    assert!((scaled["total"].as_f64().unwrap() * 8.0 / number("total") - 1.0).abs() < 1e-6);
+
+    // From the densities to a packing of just these spheres.
+    let (densities, packing) = (path(&folder, "densities.csv"), path(&folder, "packing.json"));
+    answer(&[
+        "unfold",
+        &table,
+        "--area",
+        "200",
+        "--max-size",
+        "1",
+        "--kernel",
+        "upper-edge",
+        "-o",
+        &densities,
+    ]);
+    let packed = answer(&[
+        "pack",
+        "--densities",
+        &densities,
+        "--count",
+        "100",
+        "--fraction",
+        "0.2",
+        "-o",
+        &packing,
+    ]);
+    assert_eq!(
+        (
+            packed["particles"].as_u64().unwrap(),
+            packed["certified"].as_bool().unwrap()
+        ),
+        (100, true)
+    );
+    assert!(
+        stereology(&["unfold", &table, "--area", "200", "--strict", "--bins", "200"]).0 == 3,
+        "few profiles in a bin"
+    );
+}
+
+#[test]
+fn labelled_types_are_unfolded_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = path(&folder, "profiles.csv");
+    let rows: String = (0..200)
+        .map(|k| format!("{},{}\n", 0.2 + 0.004 * f64::from(k), k % 2))
+        .collect();
+    fs::write(&table, format!("size,type\n{rows}")).unwrap();
+    let found = answer(&[
+        "unfold",
+        &table,
+        "--area",
+        "100",
+        "--shape",
+        "sphere",
+        "--shape",
+        "ellipsoid:1,1,2",
+        "--bins",
+        "5",
+    ]);
+    let types = found["types"].as_array().unwrap();
+    let sum = |bin: usize| {
+        types
+            .iter()
+            .filter_map(|of| of["number_density"][bin].as_f64())
+            .sum::<f64>()
+    };
+    assert_eq!(types[1]["shape"], "ellipsoid:1,1,2");
+    for bin in 0..5 {
+        assert!((sum(bin) - found["number_density"][bin].as_f64().unwrap()).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_packing_is_the_same_at_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: &str, threads: &str| {
+        let (json, csv) = (
+            path(&folder, &format!("{name}.json")),
+            path(&folder, &format!("{name}.csv")),
+        );
+        let found = answer(&[
+            "pack",
+            "--lognormal",
+            "0.3",
+            "--count",
+            "300",
+            "--fraction",
+            "0.45",
+            "-o",
+            &json,
+            "--also",
+            &csv,
+            "--threads",
+            threads,
+        ]);
+        assert!((found["fraction"].as_f64().unwrap() - 0.45).abs() < 1e-9 && found["max_overlap"] == 0.0);
+        (fs::read(json).unwrap(), fs::read(csv).unwrap())
+    };
+    assert_eq!(bytes("one", "1"), bytes("two", "2"));
+}
+
+#[test]
+fn a_photograph_of_discs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (photo, out) = (path(&folder, "discs.png"), path(&folder, "out"));
+    write_discs(&photo);
+    let found = answer(&["segment", &photo, "-o", &out, "--edge-rule", "all"]);
+    assert_eq!(found["profiles"], 80);
+    let drawn = (27.0 * 100.0 + 53.0 * 6.5 * 6.5) * std::f64::consts::PI / (260.0 * 200.0);
+    assert!(
+        (found["area_fraction"].as_f64().unwrap() / drawn - 1.0).abs() < 0.05,
+        "{found}"
+    );
+    let mut files: Vec<String> = fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(
+        files,
+        [
+            "binder.png",
+            "labels.tif",
+            "means.png",
+            "overlay.png",
+            "profiles.csv",
+            "residual.png",
+            "residual.tif",
+            "summary.json"
+        ]
+    );
+    let table = fs::read_to_string(format!("{out}/profiles.csv")).unwrap();
+    assert!(table.starts_with("id,x,y,area,size,r,g,b,category,touches_edge,weight\n") && table.lines().count() == 81);
+
+    // Its own label map, imported again, gives the same profiles; its table can be unfolded.
+    let again = path(&folder, "again");
+    let imported = answer(&[
+        "segment",
+        &photo,
+        "-o",
+        &again,
+        "--edge-rule",
+        "all",
+        "--labels",
+        &format!("{out}/labels.tif"),
+    ]);
+    assert_eq!(imported["area_fraction"], found["area_fraction"]);
+    answer(&[
+        "unfold",
+        &format!("{out}/profiles.csv"),
+        "--area",
+        "52000",
+        "--bins",
+        "5",
+    ]);
+}
+
+#[test]
+fn textures_and_their_bands() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = path(&folder, "discs.png");
+    write_discs(&photo);
+    let bands = answer(&["pyramid", &photo, "--levels", "3"]);
+    assert!(bands["reconstruction_error"].as_f64().unwrap() < 1e-12);
+    assert_eq!(bands["bands"].as_array().unwrap().len(), 3 * 4 + 2);
+
+    let (volume, picture) = (path(&folder, "t.npy"), path(&folder, "t.png"));
+    let made = answer(&[
+        "texture",
+        &photo,
+        "--size",
+        "16,20,24",
+        "--iterations",
+        "1",
+        "-o",
+        &volume,
+    ]);
+    assert_eq!(made["shape"], serde_json::json!([16, 20, 24, 3]));
+    assert!(fs::metadata(&volume).unwrap().len() > 16 * 20 * 24 * 3);
+    answer(&[
+        "texture",
+        &photo,
+        "--size",
+        "40,24",
+        "--iterations",
+        "1",
+        "-o",
+        &picture,
+    ]);
+    assert_eq!(image::open(&picture).unwrap().into_rgb8().dimensions(), (24, 40));
+}

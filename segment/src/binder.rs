@@ -8,7 +8,7 @@ use crate::kmeans::kmeans;
 /// Terms of a quadratic surface.
 const TERMS: usize = 6;
 
-/// Robust fit of the binder's colour: a quadratic surface of light in each Lab channel, and the scatter around it.
+/// Robust fit of the binder's colour: a quadratic surface of light in each channel of encoded values, and the scatter around it.
 ///
 /// # Formula
 ///
@@ -27,6 +27,7 @@ pub struct BinderModel {
     whitening: [[f64; 3]; 3],
     size: (usize, usize),
     share: f64,
+    spread: f64,
 }
 
 /// A pixel of the sample: place in −1..1 and colour.
@@ -39,14 +40,16 @@ struct Sample {
 /// Pixels in the sample, at least, where the photo has as many.
 const SAMPLE: usize = 16_000;
 /// Distance beyond which a pixel does not count as binder while fitting.
-const GATE: f64 = 3.0;
-/// Variance that a three-dimensional Gaussian loses when it is cut at [`GATE`]: P(χ²₅ < 9) / P(χ²₃ < 9).
-const TRIMMED: f64 = 0.9178;
-/// Least standard deviation in Lab: a grey level of an 8-bit picture, smoothed.
-const LEAST_DEVIATION: f64 = 0.25;
+const GATE: f64 = 2.5;
+/// Least standard deviation: half a grey level of an 8-bit picture.
+const LEAST_DEVIATION: f64 = 0.5 / 255.0;
+/// Scatter that is small for a photo: at this, twice the pixels outweigh twice the scatter.
+const WIDE: f64 = 3.0 / 255.0;
+/// Standard deviation around a guess to start from.
+const FIRST_DEVIATION: f64 = 8.0 / 255.0;
 
 impl BinderModel {
-    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken. `colour`, in Lab, makes it the only guess.
+    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken. `colour`, sRGB / 255, makes it the only guess.
     ///
     /// # Complexity
     ///
@@ -55,21 +58,21 @@ impl BinderModel {
     /// # Examples
     ///
     /// ```
-    /// use stereology_segment::{BinderModel, lab_image};
+    /// use stereology_segment::{BinderModel, encoded_image};
     ///
     /// // A grey binder, lit from the left, with a white square in it.
     /// let photo = image::RgbImage::from_fn(64, 64, |x, y| {
     ///     let level = if (20..30).contains(&x) && (20..30).contains(&y) { 250 } else { 100 + x as u8 / 2 + (x * 7 + y * 5) as u8 % 3 };
     ///     image::Rgb([level; 3])
     /// });
-    /// let lab = lab_image(&photo);
-    /// let binder = BinderModel::fit(&lab, None, 0);
-    /// let distance = binder.distance(&lab);
+    /// let picture = encoded_image(&photo);
+    /// let binder = BinderModel::fit(&picture, None, 0);
+    /// let distance = binder.distance(&picture);
     /// assert!(distance[[25, 25]] > 20.0 && distance[[50, 5]] < 4.0 && distance[[50, 60]] < 4.0);
     /// ```
     #[must_use]
-    pub fn fit(lab: &Array2<[f32; 3]>, colour: Option<[f32; 3]>, seed: u64) -> Self {
-        let samples = sample(lab);
+    pub fn fit(picture: &Array2<[f32; 3]>, colour: Option<[f32; 3]>, seed: u64) -> Self {
+        let samples = sample(picture);
         let colours: Vec<[f64; 3]> = samples.iter().map(|s| s.colour).collect();
         let guesses = match colour {
             Some(c) => vec![c.map(f64::from)],
@@ -78,15 +81,16 @@ impl BinderModel {
         let fits: Vec<(f64, Self)> = guesses
             .par_iter()
             .map(|guess| {
-                let model = Self::from_guess(&samples, *guess, lab.dim());
-                (model.share / model.spread().max(1.0).powf(0.7), model)
+                let model = Self::from_guess(&samples, *guess, picture.dim());
+                (model.score(), model)
             })
             .collect();
         let mut best = Self {
             surface: [[0.0; TERMS]; 3],
             whitening: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            size: lab.dim(),
+            size: picture.dim(),
             share: 0.0,
+            spread: f64::INFINITY,
         };
         let mut best_score = f64::NEG_INFINITY;
         for (score, model) in fits {
@@ -101,9 +105,10 @@ impl BinderModel {
         // Start wide around the guess; each round fits what the last round calls binder.
         let mut model = Self {
             surface: guess.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            whitening: identity(1.0 / 4.0),
+            whitening: identity(1.0 / FIRST_DEVIATION),
             size,
             share: 0.0,
+            spread: f64::INFINITY,
         };
         for (round, terms) in [1, 1, 3, 3, TERMS, TERMS, TERMS, TERMS].into_iter().enumerate() {
             let gate = if round < 2 { 2.0 } else { GATE };
@@ -116,15 +121,20 @@ impl BinderModel {
             }
             model.surface = fit_surface(&inside, terms);
             model.share = inside.len() as f64 / samples.len() as f64;
-            model.whitening = scatter(&model, &inside);
+            (model.whitening, model.spread) = scatter(&model, &inside);
         }
         model
     }
 
-    /// Lab colour of the binder at a pixel, light included.
+    /// Colour of the binder at a pixel, light included.
     #[must_use]
     pub fn light(&self, x: usize, y: usize) -> [f32; 3] {
         self.at(self.place(x, y)).map(|c| c as f32)
+    }
+
+    /// Pixels for their scatter: a wide cloud holds many pixels of anything.
+    fn score(&self) -> f64 {
+        self.share / (self.spread() + WIDE)
     }
 
     /// Share of the photo's pixels that are binder, 0 to 1.
@@ -133,16 +143,16 @@ impl BinderModel {
         self.share
     }
 
-    /// Geometric mean of the standard deviations of the binder's colour in Lab.
+    /// Standard deviation of the binder's colour around its surface, the root mean square of the three channels, sRGB / 255.
     #[must_use]
     pub fn spread(&self) -> f64 {
-        (self.whitening[0][0] * self.whitening[1][1] * self.whitening[2][2]).powf(-1.0 / 3.0)
+        self.spread
     }
 
     /// Difference of every pixel to the binder there, in units of the binder's scatter: a vector whose length is the robust distance z.
     #[must_use]
-    pub fn deviation(&self, lab: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
-        let mut out = lab.clone();
+    pub fn deviation(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
+        let mut out = picture.clone();
         let w = self.whitening.map(|row| row.map(|v| v as f32));
         out.axis_iter_mut(Axis(0))
             .into_par_iter()
@@ -171,8 +181,8 @@ impl BinderModel {
     ///
     /// See [`BinderModel::fit`].
     #[must_use]
-    pub fn distance(&self, lab: &Array2<[f32; 3]>) -> Array2<f32> {
-        self.deviation(lab).mapv(length)
+    pub fn distance(&self, picture: &Array2<[f32; 3]>) -> Array2<f32> {
+        self.deviation(picture).mapv(length)
     }
 
     fn place(&self, x: usize, y: usize) -> [f64; 2] {
@@ -215,15 +225,15 @@ fn basis([u, v]: [f64; 2]) -> [f64; TERMS] {
 }
 
 /// Pixels on a square lattice.
-fn sample(lab: &Array2<[f32; 3]>) -> Vec<Sample> {
-    let (height, width) = lab.dim();
+fn sample(picture: &Array2<[f32; 3]>) -> Vec<Sample> {
+    let (height, width) = picture.dim();
     let step = ((height * width / SAMPLE) as f64).sqrt().floor().max(1.0) as usize;
     let at = |n: usize| (step / 2..n).step_by(step);
     at(height)
         .flat_map(|y| at(width).map(move |x| (x, y)))
         .map(|(x, y)| Sample {
             place: place(x, y, (height, width)),
-            colour: lab[[y, x]].map(f64::from),
+            colour: picture[[y, x]].map(f64::from),
         })
         .collect()
 }
@@ -270,8 +280,9 @@ fn fit_surface(inside: &[&Sample], terms: usize) -> [[f64; TERMS]; 3] {
     })
 }
 
-/// Inverse Cholesky factor of the covariance around the surface, made up for the trimming and kept above the quantisation.
-fn scatter(model: &BinderModel, inside: &[&Sample]) -> [[f64; 3]; 3] {
+/// Inverse Cholesky factor of the covariance around the surface, and its standard deviation. The covariance gives the shape, the median distance the scale, so that particles of a colour near the binder's do
+/// not widen it; it is kept above the quantisation.
+fn scatter(model: &BinderModel, inside: &[&Sample]) -> ([[f64; 3]; 3], f64) {
     let mut cov = [[0.0; 3]; 3];
     for s in inside {
         let b = model.at(s.place);
@@ -282,14 +293,42 @@ fn scatter(model: &BinderModel, inside: &[&Sample]) -> [[f64; 3]; 3] {
             }
         }
     }
-    let scale = 1.0 / (TRIMMED * inside.len() as f64);
+    cov.iter_mut().flatten().for_each(|v| *v /= inside.len() as f64);
+    let floor = LEAST_DEVIATION * LEAST_DEVIATION;
+    let w = inverse_factor(&cov, floor);
+    // Channels that scatter: 1 for a grey photo, 3 for a coloured one.
+    let dimension = (3.0 - w.iter().flatten().map(|v| v * v).sum::<f64>() * floor).clamp(1.0, 3.0);
+    let mut squares: Vec<f64> = inside
+        .iter()
+        .map(|s| {
+            let b = model.at(s.place);
+            let d = [s.colour[0] - b[0], s.colour[1] - b[1], s.colour[2] - b[2]];
+            w.iter()
+                .map(|w| (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]).powi(2))
+                .sum()
+        })
+        .collect();
+    let middle = squares.len() / 2;
+    let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+    // Median of chi squared of one and of three degrees of freedom, cut at the gate.
+    let expected = 0.443 + (dimension - 1.0) * 0.833;
+    let scale = *median / expected;
     cov.iter_mut().flatten().for_each(|v| *v *= scale);
-    (0..3).for_each(|i| cov[i][i] += LEAST_DEVIATION * LEAST_DEVIATION);
+    (
+        inverse_factor(&cov, floor),
+        ((cov[0][0] + cov[1][1] + cov[2][2]) / 3.0 + floor).sqrt(),
+    )
+}
+
+/// Lower triangular W with WᵀW the inverse of a covariance, given by its lower triangle, plus `floor` on the diagonal.
+fn inverse_factor(cov: &[[f64; 3]; 3], floor: f64) -> [[f64; 3]; 3] {
+    let mut cov = *cov;
+    (0..3).for_each(|i| cov[i][i] += floor);
     let l00 = cov[0][0].sqrt();
     let (l10, l20) = (cov[1][0] / l00, cov[2][0] / l00);
-    let l11 = (cov[1][1] - l10 * l10).max(1e-6).sqrt();
+    let l11 = (cov[1][1] - l10 * l10).max(1e-12).sqrt();
     let l21 = (cov[2][1] - l20 * l10) / l11;
-    let l22 = (cov[2][2] - l20 * l20 - l21 * l21).max(1e-6).sqrt();
+    let l22 = (cov[2][2] - l20 * l20 - l21 * l21).max(1e-12).sqrt();
     // Inverse of a lower triangle.
     let (w00, w11, w22) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
     let w10 = -l10 * w00 * w11;

@@ -3,7 +3,7 @@
 //! A cut stone shows particles in a binder. Unfolding needs the size of each cut particle, its profile; the solid texture needs its colour, and what is left when the mean colours are taken away.
 //!
 //! ```text
-//! photo → Lab, smoothed → binder b(x, y), scatter Σ → z = √((p − b)ᵀ Σ⁻¹ (p − b)) → hysteresis at z = 5 / 9
+//! photo / 255, smoothed → binder b(x, y), scatter Σ → z = √((p − b)ᵀ Σ⁻¹ (p − b)) → hysteresis at z = 5 / 9
 //!       → outlines at half contrast: (p − b)·(c − b) ≥ ½ |c − b|²  → touching particles apart: by colour, then by shape
 //! photo / 255 = means + residual
 //! ```
@@ -70,7 +70,7 @@ pub use category::{Category, categorise};
 pub use error::SegmentError;
 pub use finding::Finding;
 pub use kmeans::{Clusters, kmeans, silhouette};
-pub use lab::{lab, lab_image, smooth};
+pub use lab::{encoded_image, lab, lab_image, smooth};
 pub use label_map::{read_labels, write_labels};
 pub use options::{EdgeRule, Holes, SegmentOptions};
 pub use photo::read_photo;

@@ -10,7 +10,7 @@ use crate::{
     category::{Category, categorise},
     error::SegmentError,
     finding::Finding,
-    lab::{lab, lab_image, smooth},
+    lab::{encoded_image, lab_image, smooth},
     options::{EdgeRule, Holes, SegmentOptions},
     profile::{Index, Profile, Window, measure, size_of_area, weigh},
     refine::half_contrast,
@@ -54,7 +54,7 @@ type Progress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 
 /// Finds the profiles of particles in a photo of a section.
 ///
-/// The steps, each a function of its own: [`lab_image`] and [`smooth`]; [`BinderModel`], whose colour and light are fitted robustly; [`hysteresis`] of the distance to it, [`fill_holes`], [`open`];
+/// The steps, each a function of its own: [`encoded_image`] and [`smooth`]; [`BinderModel`], whose colour and light are fitted robustly; [`hysteresis`] of the distance to it, [`fill_holes`], [`open`];
 /// [`half_contrast`]; [`split_by_colour`], [`split_by_shape`]; small profiles dropped, edges weighed, colours put in categories.
 ///
 /// # Errors
@@ -91,9 +91,9 @@ pub fn segment(
         ControlFlow::Break(()) => Err(SegmentError::Cancelled),
     };
     report(0.0)?;
-    let colours = smooth(&lab_image(photo), options.smoothing);
+    let colours = smooth(&encoded_image(photo), options.smoothing);
     report(0.15)?;
-    let binder = BinderModel::fit(&colours, options.binder.map(|c| lab(c.map(|v| v as f32))), options.seed);
+    let binder = BinderModel::fit(&colours, options.binder.map(|c| c.map(|v| v as f32)), options.seed);
     report(0.3)?;
     let deviation = binder.deviation(&colours);
     let distance = deviation.mapv(length);
@@ -105,13 +105,15 @@ pub fn segment(
         fill_holes(&mut mask, small_hole);
     }
     open(&mut mask);
+    // The first outline follows the threshold, so that its cores hold blurred rims; the second round has clean ones.
+    let mask = half_contrast(&deviation, &mask);
     let mut mask = half_contrast(&deviation, &mask);
     if options.holes == Holes::Fill {
         fill_holes(&mut mask, small_hole);
     }
     open(&mut mask);
     report(0.6)?;
-    let parts = split_by_colour(&colours, &mask, options.seed);
+    let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
     report(0.75)?;
     let mut labels = split_by_shape(&parts);
     if options.holes == Holes::Fill {

@@ -14,9 +14,9 @@ use crate::{
 /// Colour groups looked for inside the mask.
 const GROUPS: usize = 8;
 /// Depth, pixels, that both parts must have to count as particles of their own.
-const PART_DEPTH: f32 = 2.0;
+const PART_DEPTH: f32 = 3.0;
 /// Difference of mean colour in Lab below which touching parts are one particle.
-const SAME_COLOUR: f64 = 14.0;
+const SAME_COLOUR: f64 = 18.0;
 
 /// What is known of a part of a region.
 #[derive(Clone, Copy, Default)]
@@ -144,7 +144,7 @@ fn unlikeness(a: &Part, b: &Part, border: f64) -> Option<f64> {
         // A rim of mixed colour goes where most of its outline is.
         return Some(difference / (1.0 + border));
     }
-    (difference < SAME_COLOUR.max(2.0 * texture)).then_some(1000.0 + difference)
+    (difference < SAME_COLOUR.max(2.5 * texture)).then_some(1000.0 + difference)
 }
 
 /// Mask of the parts with lines one pixel wide between those that touch.

@@ -95,9 +95,20 @@ pub fn segment(
     report(0.15)?;
     let binder = BinderModel::fit(&colours, options.binder.map(|c| c.map(|v| v as f32)), options.seed);
     report(0.3)?;
-    let deviation = binder.deviation(&colours);
-    let distance = deviation.mapv(length);
+    let mut binder = binder;
+    let mut deviation = binder.deviation(&colours);
+    let mut distance = deviation.mapv(length);
     let [low, high] = options.thresholds;
+    let mut clear = stands_out(&distance, low, high);
+    if !clear && options.binder.is_none() {
+        let (two_tones, apart) = BinderModel::fit_two_tones(&colours, options.seed);
+        if apart > TWO_TONES {
+            binder = two_tones;
+            deviation = binder.deviation(&colours);
+            distance = deviation.mapv(length);
+            clear = true;
+        }
+    }
     let mut mask = hysteresis(&distance, low, high);
     report(0.4)?;
     let small_hole = |hole: usize, around: usize| hole <= options.min_area.max(around / 20);
@@ -105,9 +116,10 @@ pub fn segment(
         fill_holes(&mut mask, small_hole);
     }
     open(&mut mask);
-    // The first outline follows the threshold, so that its cores hold blurred rims; the second round has clean ones.
-    let mask = half_contrast(&deviation, &mask);
-    let mut mask = half_contrast(&deviation, &mask);
+    // The first outline follows the threshold, so that its cores hold blurred rims; later rounds have cleaner ones.
+    for _ in 0..ROUNDS {
+        mask = half_contrast(&deviation, &mask);
+    }
     if options.holes == Holes::Fill {
         fill_holes(&mut mask, small_hole);
     }
@@ -116,6 +128,7 @@ pub fn segment(
     let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
     report(0.75)?;
     let mut labels = split_by_shape(&parts);
+    drop_faint(&mut labels, &distance, high);
     if options.holes == Holes::Fill {
         fill_label_holes(&mut labels);
     }
@@ -127,7 +140,7 @@ pub fn segment(
         });
     }
     out.renumber();
-    out.judge_binder(&binder, &distance, options);
+    out.judge_binder(&binder, clear);
     report(1.0)?;
     Ok(out)
 }
@@ -287,17 +300,53 @@ impl Segmentation {
         }
     }
 
-    fn judge_binder(&mut self, binder: &BinderModel, _distance: &Array2<f32>, _options: &SegmentOptions) {
-        if binder.share() < 0.25 {
+    fn judge_binder(&mut self, binder: &BinderModel, clear: bool) {
+        let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
+        if binder.share() < 0.2 {
+            let share = 100.0 * binder.share();
             self.findings.push(Finding::new(
                 "no-binder",
-                format!(
-                    "the likeliest binder covers only {:.0} % of the photo; give its colour, or import a label map",
-                    100.0 * binder.share()
-                ),
+                format!("the likeliest binder covers only {share:.0} % of the photo; {advice}"),
+            ));
+        } else if !clear {
+            self.findings.push(Finding::new("no-binder", format!("most of what differs from the likeliest binder differs by little: its colours go over into those of the rest, and outlines are arbitrary; {advice}")));
+        } else if self.area_fraction > 0.85 {
+            let percent = 100.0 * self.area_fraction;
+            self.findings.push(Finding::new(
+                "no-binder",
+                format!("{percent:.0} % of the photo would be particles; {advice}"),
             ));
         }
     }
+}
+
+/// Rounds of refining outlines: the third moves them by less than a tenth of a pixel.
+const ROUNDS: usize = 3;
+/// Distance of two tones over the sum of their scatters from which they are two.
+const TWO_TONES: f64 = 1.69;
+
+/// Whether the distances to the binder fall into two heaps: as many pixels well beyond the thresholds as between them, nearly.
+fn stands_out(distance: &Array2<f32>, low: f32, high: f32) -> bool {
+    let beyond = distance.iter().filter(|z| **z >= high).count();
+    let between = distance.iter().filter(|z| **z >= low && **z < high).count();
+    beyond as f64 > 0.6 * between as f64
+}
+
+/// Takes away labels of which less than a tenth of the pixels is at least `high` from the binder: flecks of its texture.
+fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, high: f32) {
+    let count = labels.iter().copied().max().unwrap_or(0) as usize + 1;
+    let mut sums = vec![(0_usize, 0_usize); count];
+    for (&label, z) in labels.iter().zip(distance) {
+        sums[label as usize].0 += usize::from(*z >= high);
+        sums[label as usize].1 += 1;
+    }
+    labels.mapv_inplace(|l| {
+        if l != 0 && 10 * sums[l as usize].0 >= sums[l as usize].1 {
+            l
+        } else {
+            0
+        }
+    });
 }
 
 /// Labels whose pixels form several pieces, increasing.

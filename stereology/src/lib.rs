@@ -41,6 +41,8 @@
 pub mod files;
 #[cfg(feature = "pipeline")]
 pub mod pipeline;
+#[cfg(feature = "pipeline")]
+pub mod sample;
 
 #[cfg(feature = "anneal")]
 pub use stereology_anneal as anneal;

@@ -1,5 +1,6 @@
 //! `cargo xtask`: the work on the workspace that is not the program itself.
 
+mod figures;
 mod sample;
 mod tidy;
 
@@ -21,6 +22,11 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
+    /// Draws the paper's figures into docs/figures
+    Figures {
+        /// Only those whose name holds this
+        only: Option<String>,
+    },
     /// Makes the built-in sample and its truth anew
     Sample,
     /// Runs all that has to pass before a change lands
@@ -30,6 +36,7 @@ enum Task {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
+        Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),
     }

@@ -1,6 +1,6 @@
 //! The chain from a photograph to its solid: what composes the rooms.
 //!
-//! [`synthesize`] is the whole chain; its steps can be called alone: [`measured_profiles`], [`particle_densities`], [`population`], [`fine_details`], [`verify`].
+//! [`synthesize`] is the whole chain; its steps can be called alone: [`measured_profiles`], [`particle_densities`], [`population`], [`fine_details`], [`verify`], [`residual_spectra`].
 
 mod association;
 mod colouring;
@@ -8,6 +8,7 @@ mod densities;
 mod fine_details;
 mod particle_types;
 mod population;
+mod residual_spectra;
 mod synthesis;
 mod verification;
 mod warning;
@@ -19,6 +20,7 @@ pub use densities::{DensityError, DensityOptions, MeasuredProfiles, ParticleDens
 pub use fine_details::{FineDetails, fine_details};
 pub use particle_types::{ParticleType, ParticleTypes, ParticleTypesError};
 pub use population::{Extent, Population, PopulationFailure, population};
+pub use residual_spectra::{ResidualSpectra, SpectraError, residual_spectra};
 pub use synthesis::{Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize};
 pub use verification::{Comparison, Recipe, Verification, VerificationError, verify};
 pub use warning::Warning;

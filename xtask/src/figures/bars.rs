@@ -49,11 +49,19 @@ pub fn draw(path: &Path, panels: &[Panel<'_>], columns: usize) -> Result<()> {
     root.present().map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-fn draw_panel(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, panel: &Panel<'_>) -> Result<(), Box<dyn std::error::Error>> {
+fn draw_panel(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    panel: &Panel<'_>,
+) -> Result<(), Box<dyn std::error::Error>> {
     let top = panel
         .series
         .iter()
-        .flat_map(|of| of.values.iter().enumerate().map(|(i, v)| v + of.errors.map_or(0.0, |e| e[i])))
+        .flat_map(|of| {
+            of.values
+                .iter()
+                .enumerate()
+                .map(|(i, v)| v + of.errors.map_or(0.0, |e| e[i]))
+        })
         .fold(1e-300, f64::max);
     let mut chart = ChartBuilder::on(area)
         .margin(10)
@@ -61,13 +69,21 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, panel:
         .x_label_area_size(36)
         .y_label_area_size(56)
         .build_cartesian_2d(0.0..1.0, 0.0..1.08 * top)?;
-    chart.configure_mesh().disable_x_mesh().light_line_style(TRANSPARENT).bold_line_style(INK.mix(0.1)).x_desc(panel.across).y_desc(panel.up).draw()?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(INK.mix(0.1))
+        .x_desc(panel.across)
+        .y_desc(panel.up)
+        .draw()?;
     let beside = panel.series.len() as f64;
     for (place, of) in panel.series.iter().enumerate() {
         let bins = of.values.len() as f64;
         let left = |i: usize| (i as f64 + 0.1 + 0.8 * place as f64 / beside) / bins;
         let width = 0.8 / beside / bins;
-        let bar = |(i, &value): (usize, &f64)| Rectangle::new([(left(i), 0.0), (left(i) + width, value)], of.colour.filled());
+        let bar =
+            |(i, &value): (usize, &f64)| Rectangle::new([(left(i), 0.0), (left(i) + width, value)], of.colour.filled());
         let colour = of.colour;
         chart
             .draw_series(of.values.iter().enumerate().map(bar))?
@@ -82,7 +98,11 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, panel:
         }
     }
     if panel.series.len() > 1 {
-        chart.configure_series_labels().position(SeriesLabelPosition::UpperRight).background_style(WHITE.mix(0.8)).draw()?;
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.8))
+            .draw()?;
     }
     Ok(())
 }

@@ -11,7 +11,9 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use stereology::anneal::{Grain, PackOptions, Packing, SizeDensities, SizeInBin, grains_from_densities, pack, populate};
+use stereology::anneal::{
+    Grain, PackOptions, Packing, SizeDensities, SizeInBin, grains_from_densities, pack, populate,
+};
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::ParticleTypes;
 use stereology::render::{BlockOptions, render_block};
@@ -35,10 +37,26 @@ struct Distribution {
 }
 
 const DISTRIBUTIONS: [Distribution; 4] = [
-    Distribution { name: "single mode", density: |d| gauss(d, 0.55, 0.15), profiles: 1200.0 },
-    Distribution { name: "bimodal", density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08), profiles: 1250.0 },
-    Distribution { name: "lognormal", density: |d| gauss(d.ln(), 0.30_f64.ln(), 0.45) / d, profiles: 1150.0 },
-    Distribution { name: "constant", density: |_| 1.0, profiles: 1300.0 },
+    Distribution {
+        name: "single mode",
+        density: |d| gauss(d, 0.55, 0.15),
+        profiles: 1200.0,
+    },
+    Distribution {
+        name: "bimodal",
+        density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08),
+        profiles: 1250.0,
+    },
+    Distribution {
+        name: "lognormal",
+        density: |d| gauss(d.ln(), 0.30_f64.ln(), 0.45) / d,
+        profiles: 1150.0,
+    },
+    Distribution {
+        name: "constant",
+        density: |_| 1.0,
+        profiles: 1300.0,
+    },
 ];
 
 fn gauss(x: f64, mean: f64, deviation: f64) -> f64 {
@@ -72,8 +90,13 @@ fn experiment(index: usize) -> Result<Experiment> {
     // N_A = N_V × mean diameter, eq. (1).
     let count = of.profiles / (PLANES as f64 * SIDE * SIDE * mean) * SIDE.powi(3);
     let draw = |place: f64| (cumulative.partition_point(|c| *c < place).min(steps - 1) + 1) as f64 / steps as f64;
-    let grains: Vec<Grain> =
-        (0..count.round() as usize).map(|_| Grain { shape: 0, size: draw(rng.random()), category: 0 }).collect();
+    let grains: Vec<Grain> = (0..count.round() as usize)
+        .map(|_| Grain {
+            shape: 0,
+            size: draw(rng.random()),
+            category: 0,
+        })
+        .collect();
     let types = ParticleTypes::parse(&["sphere"])?;
     let packing = packed(&types, &grains, 70 + index as u64)?;
 
@@ -106,15 +129,38 @@ fn experiment(index: usize) -> Result<Experiment> {
 fn packed(types: &ParticleTypes, grains: &[Grain], seed: u64) -> Result<Packing> {
     let bodies: Vec<UnitBody> = types.unit_bodies();
     let period = PeriodicBox::new(Vector3::repeat(SIDE))?;
-    Ok(pack(&bodies, populate(grains, &period, seed), &period, &PackOptions::default(), &|_| ControlFlow::Continue(()))?)
+    Ok(pack(
+        &bodies,
+        populate(grains, &period, seed),
+        &period,
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )?)
 }
 
 /// Every sphere in its own colour, in grey.
 fn coloured(packing: &Packing) -> Result<Solid> {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let hues = [[0.75, 0.35, 0.25], [0.30, 0.45, 0.60], [0.85, 0.70, 0.40], [0.35, 0.50, 0.35], [0.55, 0.40, 0.55]];
-    let colours = packing.particles().iter().map(|_| hues[rng.random_range(0..hues.len())]).collect();
-    Ok(Solid::new(packing.bodies().to_vec(), packing.particles().to_vec(), colours, *packing.period(), [0.78, 0.77, 0.74], None)?)
+    let hues = [
+        [0.75, 0.35, 0.25],
+        [0.30, 0.45, 0.60],
+        [0.85, 0.70, 0.40],
+        [0.35, 0.50, 0.35],
+        [0.55, 0.40, 0.55],
+    ];
+    let colours = packing
+        .particles()
+        .iter()
+        .map(|_| hues[rng.random_range(0..hues.len())])
+        .collect();
+    Ok(Solid::new(
+        packing.bodies().to_vec(),
+        packing.particles().to_vec(),
+        colours,
+        *packing.period(),
+        [0.78, 0.77, 0.74],
+        None,
+    )?)
 }
 
 fn values(unfolding: &Unfolding) -> Vec<f64> {
@@ -122,10 +168,19 @@ fn values(unfolding: &Unfolding) -> Vec<f64> {
 }
 
 pub fn draw(folder: &Path) -> Result<()> {
-    let experiments = (0..DISTRIBUTIONS.len()).into_par_iter().map(experiment).collect::<Result<Vec<_>>>()?;
+    let experiments = (0..DISTRIBUTIONS.len())
+        .into_par_iter()
+        .map(experiment)
+        .collect::<Result<Vec<_>>>()?;
     let bars: Vec<(String, Vec<f64>, Vec<f64>)> = experiments
         .iter()
-        .map(|of| (format!("{} ({} profiles)", of.name, of.em.profiles), values(&of.paper), values(&of.em)))
+        .map(|of| {
+            (
+                format!("{} ({} profiles)", of.name, of.em.profiles),
+                values(&of.paper),
+                values(&of.em),
+            )
+        })
         .collect();
     let panels: Vec<Panel<'_>> = experiments
         .iter()
@@ -135,9 +190,24 @@ pub fn draw(folder: &Path) -> Result<()> {
             across: "diameter over the largest",
             up: "particles per volume",
             series: vec![
-                Series { name: "actual", values: &of.actual, errors: None, colour: BLUE },
-                Series { name: "the paper's inverse", values: paper, errors: None, colour: RED },
-                Series { name: "expectation maximisation", values: em, errors: None, colour: GREEN },
+                Series {
+                    name: "actual",
+                    values: &of.actual,
+                    errors: None,
+                    colour: BLUE,
+                },
+                Series {
+                    name: "the paper's inverse",
+                    values: paper,
+                    errors: None,
+                    colour: RED,
+                },
+                Series {
+                    name: "expectation maximisation",
+                    values: em,
+                    errors: None,
+                    colour: GREEN,
+                },
             ],
         })
         .collect();
@@ -148,11 +218,17 @@ pub fn draw(folder: &Path) -> Result<()> {
         .flat_map(|(of, (_, paper, em))| {
             (0..BINS).map(move |i| {
                 let numbers = [(i + 1) as f64 / BINS as f64, of.actual[i], paper[i], em[i]];
-                std::iter::once(of.name.to_owned()).chain(numbers.map(|n| format!("{n:.5}"))).collect()
+                std::iter::once(of.name.to_owned())
+                    .chain(numbers.map(|n| format!("{n:.5}")))
+                    .collect()
             })
         })
         .collect();
-    table(&folder.join("figure-07-density-recovery.csv"), &["distribution", "upper_edge", "actual", "paper", "em"], &rows)
+    table(
+        &folder.join("figure-07-density-recovery.csv"),
+        &["distribution", "upper_edge", "actual", "paper", "em"],
+        &rows,
+    )
 }
 
 /// Figure 8: part of the single-mode volume beside one packed from the recovered densities.
@@ -161,12 +237,21 @@ pub fn draw_volumes(folder: &Path) -> Result<()> {
     let types = ParticleTypes::parse(&["sphere"])?;
     let edges = equal_edges(1.0, BINS);
     let number_density = values(&of.em);
-    let recovered = SizeDensities { shape: 0, category: 0, edges: &edges, number_density: &number_density };
+    let recovered = SizeDensities {
+        shape: 0,
+        category: 0,
+        edges: &edges,
+        number_density: &number_density,
+    };
     let grains = grains_from_densities(&[recovered], SIDE.powi(3), SizeInBin::Spread, 9)?;
     let copy = packed(&types, &grains, 90)?;
     let part = |packing: &Packing| -> Result<RgbImage> {
         let solid = coloured(packing)?;
-        Ok(render_block(&|p| solid.colour_at(p), Vector3::repeat(0.5 * SIDE), &BlockOptions::default())?)
+        Ok(render_block(
+            &|p| solid.colour_at(p),
+            Vector3::repeat(0.5 * SIDE),
+            &BlockOptions::default(),
+        )?)
     };
     let (original, copy) = (part(&of.packing)?, part(&copy)?);
     let mut both = RgbImage::new(original.width() + copy.width(), original.height());

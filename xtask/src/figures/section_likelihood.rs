@@ -31,7 +31,12 @@ pub fn draw(folder: &Path) -> Result<()> {
             title: name,
             across: "√(A / A_max)",
             up: "likelihood",
-            series: vec![Series { name: "", values: likelihood, errors: Some(errors), colour: BLUE }],
+            series: vec![Series {
+                name: "",
+                values: likelihood,
+                errors: Some(errors),
+                colour: BLUE,
+            }],
         })
         .collect();
     draw_bars(&folder.join("figure-04-section-likelihood.svg"), &panels, 3)?;
@@ -39,9 +44,18 @@ pub fn draw(folder: &Path) -> Result<()> {
         .iter()
         .flat_map(|(name, likelihood, errors)| {
             (0..BINS).map(|i| {
-                vec![name.replace(',', ""), ((i + 1) as f64 / BINS as f64).to_string(), format!("{:.6}", likelihood[i]), format!("{:.1e}", errors[i])]
+                vec![
+                    name.replace(',', ""),
+                    ((i + 1) as f64 / BINS as f64).to_string(),
+                    format!("{:.6}", likelihood[i]),
+                    format!("{:.1e}", errors[i]),
+                ]
             })
         })
         .collect();
-    table(&folder.join("figure-04-section-likelihood.csv"), &["shape", "upper_edge", "likelihood", "standard_error"], &rows)
+    table(
+        &folder.join("figure-04-section-likelihood.csv"),
+        &["shape", "upper_edge", "likelihood", "standard_error"],
+        &rows,
+    )
 }

@@ -1,0 +1,73 @@
+//! The built-in sample: a section of a packing whose every particle is known.
+
+use image::{ImageError, ImageFormat, RgbImage};
+use serde::Deserialize;
+
+/// The photograph, 912 × 672 pixels: slate and brick chips and larger ochre pebbles of two shapes in a pale binder, with texture, uneven light, blur and noise.
+///
+/// # Errors
+///
+/// None in practice: the picture is part of the program.
+pub fn photo() -> Result<RgbImage, ImageError> {
+    Ok(image::load_from_memory_with_format(PHOTO, ImageFormat::Png)?.into_rgb8())
+}
+
+/// What is true of the solid that [`photo`] was cut from. Lengths in pixels.
+///
+/// # Errors
+///
+/// None in practice: the file is part of the program.
+pub fn truth() -> Result<Truth, serde_json::Error> {
+    serde_json::from_slice(TRUTH)
+}
+
+const PHOTO: &[u8] = include_bytes!("../assets/sample.png");
+const TRUTH: &[u8] = include_bytes!("../assets/sample.json");
+
+/// The solid behind the sample.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[non_exhaustive]
+pub struct Truth {
+    /// Shapes of the particles and their shares by number.
+    pub shapes: Vec<ShapeShare>,
+    /// Particles per unit volume.
+    pub total_number_density: f64,
+    /// Their mean size.
+    pub mean_size: f64,
+    /// Share of the volume inside particles.
+    pub volume_fraction: f64,
+    /// Share of the photograph inside profiles.
+    pub area_fraction: f64,
+    /// Edges of size bins.
+    pub edges: Vec<f64>,
+    /// Particles per unit volume in each.
+    pub number_density: Vec<f64>,
+    /// Colour categories.
+    pub categories: Vec<TrueCategory>,
+    /// Mean colour of the binder, sRGB-encoded / 255.
+    pub binder: [f64; 3],
+    /// Sizes of the profiles on the photograph, as one period shows them.
+    pub profile_sizes: Vec<f64>,
+}
+
+/// A shape and its share of the particles.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[non_exhaustive]
+pub struct ShapeShare {
+    /// What it is.
+    pub shape: String,
+    /// Its share by number.
+    pub share: f64,
+}
+
+/// A colour category of the sample.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[non_exhaustive]
+pub struct TrueCategory {
+    /// What people would call it.
+    pub name: String,
+    /// Its mean colour, sRGB-encoded / 255.
+    pub colour: [f64; 3],
+    /// Particles per unit volume in each size bin.
+    pub number_density: Vec<f64>,
+}

@@ -1,0 +1,89 @@
+//! Figures 5, 6 and 10: a block of the sample's solid in mean colours, with its residual, and by Heeger and Bergen's method alone.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use image::imageops::{crop_imm, replace};
+use nalgebra::Vector3;
+use ndarray::{Array3, Array4};
+use stereology::pipeline::{ParticleTypes, Synthesis, SynthesisOptions, synthesize};
+use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
+use stereology::render::{BlockOptions, render_block};
+use stereology::sample;
+use stereology::shape::Body;
+
+fn solid() -> Result<Synthesis> {
+    let shapes = sample::truth()?.shapes;
+    let bodies = shapes
+        .iter()
+        .map(|of| Ok((of.shape.clone(), Body::parse(&of.shape)?, of.share)))
+        .collect::<Result<Vec<_>>>()?;
+    Ok(synthesize(
+        &sample::photo()?,
+        None,
+        &ParticleTypes::new(bodies)?,
+        &SynthesisOptions::default(),
+        &|_, _| ControlFlow::Continue(()),
+    )?)
+}
+
+/// Blocks: mean colours (5 a, 10 d), with the residual (5 b, 10 c), and the photograph itself synthesised in 3D (10 e).
+pub fn draw_blocks(folder: &Path) -> Result<()> {
+    let made = solid()?;
+    let sides = Vector3::repeat(256.0);
+    let block = |colour: &(dyn Fn(&nalgebra::Point3<f64>) -> [f32; 3] + Sync)| {
+        render_block(colour, sides, &BlockOptions::default())
+    };
+    let plain = made.solid.without_residual();
+    block(&|p| plain.colour_at(p))?.save(folder.join("figure-05a-mean-colours.png"))?;
+    block(&|p| made.solid.colour_at(p))?.save(folder.join("figure-05b-with-residual.png"))?;
+
+    let photo = sample::photo()?;
+    let exemplar = Array3::from_shape_fn(
+        (photo.height() as usize, photo.width() as usize, 3),
+        |(y, x, channel)| f32::from(photo.get_pixel(x as u32, y as u32).0[channel]) / 255.0,
+    );
+    let options = TextureOptions::default().with_mode(Mode::Volume);
+    let texture = synthesize_volume(&Exemplar::new(exemplar.view()), [128; 3], &options, &|_| {
+        ControlFlow::Continue(())
+    })?;
+    block(&|p| voxel(&texture, p))?.save(folder.join("figure-10e-heeger-bergen-alone.png"))?;
+    Ok(())
+}
+
+fn voxel(texture: &Array4<f32>, p: &nalgebra::Point3<f64>) -> [f32; 3] {
+    let (nz, ny, nx, _) = texture.dim();
+    let index = |x: f64, n: usize| (x.max(0.0) as usize) % n;
+    [0, 1, 2].map(|channel| texture[[index(p.z, nz), index(p.y, ny), index(p.x, nx), channel]].clamp(0.0, 1.0))
+}
+
+/// Figure 6: (a) part of the photograph, (b) its mean colours, (c) the residual, (d) a slice of its synthesis in 3D.
+pub fn draw_residual(folder: &Path) -> Result<()> {
+    let made = solid()?;
+    let side = 320;
+    let part = |picture: &RgbImage| crop_imm(picture, 120, 80, side, side).to_image();
+    let binder = made.segmentation.binder.colour;
+    let volume = &made.details.residual.binder;
+    let (_, height, width, _) = volume.dim();
+    let synthesised = RgbImage::from_fn(side, side, |x, y| {
+        image::Rgb([0, 1, 2].map(|channel| {
+            let detail = f64::from(volume[[0, y as usize % height, x as usize % width, channel]]);
+            ((binder[channel] + detail) * 255.0).round().clamp(0.0, 255.0) as u8
+        }))
+    });
+    let parts = [
+        part(&sample::photo()?),
+        part(&made.segmentation.means()),
+        part(&made.segmentation.residual_picture()),
+        synthesised,
+    ];
+    let gap = 8;
+    let mut row = RgbImage::from_pixel(4 * side + 3 * gap, side, image::Rgb([255; 3]));
+    for (place, part) in parts.iter().enumerate() {
+        replace(&mut row, part, i64::try_from(place)? * i64::from(side + gap), 0);
+    }
+    row.save(folder.join("figure-06-residual.png"))
+        .context("figure 6 cannot be written")
+}

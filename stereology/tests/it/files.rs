@@ -1,0 +1,72 @@
+//! What is written is read again, bit for bit.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use ndarray::Array4;
+use proptest::prelude::*;
+use stereology::files::{PackingFile, open_solid, save_solid};
+use stereology::pipeline::ParticleTypes;
+use stereology::shape::{Particle, PeriodicBox};
+use stereology::volume::{Residual, Solid};
+
+fn particle() -> impl Strategy<Value = Particle> {
+    (
+        0_usize..2,
+        0.1..3.0_f64,
+        0_u8..255,
+        prop::array::uniform3(0.0..8.0_f64),
+        prop::array::uniform3(-3.0..3.0_f64),
+    )
+        .prop_map(|(shape, size, category, position, turn)| Particle {
+            shape,
+            size,
+            category,
+            position: Point3::from(position),
+            orientation: UnitQuaternion::from_scaled_axis(Vector3::from(turn)),
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn a_packing_comes_back_as_it_was(particles in prop::collection::vec(particle(), 0..20)) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("packing.json");
+        let period = PeriodicBox::new(Vector3::new(8.0, 9.0, 10.0)).unwrap();
+        let file = PackingFile::new(vec!["sphere".into(), "rock:1".into()], &particles, &period);
+        file.write(&path).unwrap();
+        let (read, sides) = PackingFile::read(&path).unwrap().unpack().unwrap();
+        prop_assert_eq!(read, particles);
+        prop_assert_eq!(sides, period);
+    }
+
+    #[test]
+    fn a_solid_comes_back_as_it_was(particles in prop::collection::vec(particle(), 1..12), texture in prop::collection::vec(-0.2..0.2_f32, 4 * 4 * 4 * 3)) {
+        let folder = tempfile::tempdir().unwrap();
+        let types = ParticleTypes::parse(&["sphere", "rock:1"]).unwrap();
+        let period = PeriodicBox::new(Vector3::repeat(8.0)).unwrap();
+        let colours = (0..particles.len()).map(|i| [0.1 * i as f32 % 1.0, 0.3, 0.7]).collect();
+        let field = Array4::from_shape_vec((4, 4, 4, 3), texture).unwrap();
+        let residual = Residual { particles: -&field, binder: field, voxel: 2.0 };
+        let solid = Solid::new(types.unit_bodies(), particles, colours, period, [0.8, 0.7, 0.6], Some(residual.clone())).unwrap();
+        save_solid(folder.path(), &solid, &residual, &types).unwrap();
+        let read = open_solid(folder.path()).unwrap().solid;
+        for i in 0..200 {
+            let p = Point3::new(0.37 * f64::from(i), 0.61 * f64::from(i), 0.17 * f64::from(i));
+            prop_assert_eq!(solid.id_at(&p), read.id_at(&p));
+            prop_assert_eq!(solid.colour_at(&p), read.colour_at(&p));
+        }
+    }
+}
+
+/// Every fault is told with the file it is in.
+#[test]
+fn broken_folders_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |error: stereology::files::FileError| error.to_string();
+    assert!(told(open_solid(folder.path()).unwrap_err()).contains("solid.json"));
+    std::fs::write(folder.path().join("solid.json"), "{").unwrap();
+    assert!(told(open_solid(folder.path()).unwrap_err()).contains("solid.json"));
+    std::fs::write(folder.path().join("packing.json"), r#"{"box":[1,1,1],"shapes":[],"particles":[{"shape":0,"size":1,"category":0,"position":[0,0,0],"orientation":[1,0,0,0]}]}"#).unwrap();
+    assert!(told(PackingFile::read(folder.path().join("packing.json")).unwrap_err()).contains("particle 0"));
+}

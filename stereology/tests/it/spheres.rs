@@ -1,0 +1,72 @@
+//! Analytic spheres through the composed rooms.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use stereology::anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
+use stereology::kmatrix::Sizes;
+use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
+use stereology::unfold::{Method, UnfoldOptions};
+use stereology::volume::{Axis, Solid};
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// Spheres packed, cut, and unfolded give their own number density: N_A = D N_V. With some thousand profiles of a packing, whose counts vary less than
+    /// Poisson's, 15 % is more than five standard errors.
+    #[test]
+    fn packed_spheres_are_counted_from_their_sections(seed in 0_u64..1000, fraction in 0.1..0.45_f64) {
+        let types = ParticleTypes::parse(&["sphere"]).unwrap();
+        let bodies = types.unit_bodies();
+        let grains = mix(&lognormal_sizes(600, 0.25, seed).unwrap(), &[1.0], seed).unwrap();
+        let period = box_for_fraction(&bodies, &grains, fraction).unwrap();
+        let packing = pack(&bodies, populate(&grains, &period, seed), &period, &PackOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
+        let number_density = 600.0 / period.volume();
+        let solid = Solid::new(bodies, packing.into_particles(), vec![[0.5; 3]; 600], period, [0.2; 3], None).unwrap();
+        let side = period.sides().x;
+        let planes = 12;
+        let sizes: Vec<f64> = [Axis::X, Axis::Y, Axis::Z]
+            .into_iter()
+            .flat_map(|axis| (0..planes).map(move |i| (axis, (f64::from(i) + 0.5) / f64::from(planes) * side)))
+            .flat_map(|(axis, depth)| solid.section_profiles(axis, depth))
+            .map(|(_, area)| (4.0 * area / std::f64::consts::PI).sqrt())
+            .collect();
+        let count = sizes.len();
+        let profiles = MeasuredProfiles {
+            weights: vec![1.0; count],
+            categories: vec![0; count],
+            area: 3.0 * f64::from(planes) * side * side,
+            min_size: 0.0,
+            sizes,
+        };
+        let found = particle_densities(&profiles, &types, &DensityOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
+        prop_assert!((found.all.total.value / number_density - 1.0).abs() < 0.15, "{} {number_density}", found.all.total.value);
+        prop_assert!((found.all.volume_fraction.value / fraction - 1.0).abs() < 0.15, "{} {fraction}", found.all.volume_fraction.value);
+    }
+
+    /// Whatever the bins, method and threshold, the particles drawn fill the box to the fraction asked for, exactly.
+    #[test]
+    fn a_population_fills_its_fraction(
+        sizes in prop::collection::vec(2.0..30.0_f64, 50..200),
+        fraction in 0.05..0.5_f64,
+        upper in any::<bool>(),
+        min_size in 0.0..8.0_f64,
+    ) {
+        let types = ParticleTypes::parse(&["sphere", "box:1,1,2"]).unwrap();
+        let count = sizes.len();
+        let categories = (0..count).map(|i| (i % 3) as u8).collect();
+        let profiles = MeasuredProfiles { weights: vec![1.0; count], categories, area: 500.0 * 500.0, min_size, sizes };
+        let options = DensityOptions {
+            sizes: if upper { Sizes::UpperEdge } else { Sizes::Integrated },
+            unfold: UnfoldOptions::default().with_method(Method::Nnls),
+            ..DensityOptions::default()
+        };
+        let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
+        let drawn = population(&found, &types, fraction, Extent::Count(800), 20.0, 1).unwrap();
+        let volume: f64 = drawn.grains.iter().map(|grain| types.unit_bodies()[grain.shape].volume() * grain.size.powi(3)).sum();
+        prop_assert!((volume / drawn.period.volume() - fraction).abs() < 1e-9);
+        prop_assert!((drawn.period.sides() / 20.0 - (drawn.period.sides() / 20.0).map(f64::round)).norm() < 1e-9);
+        prop_assert_eq!(drawn.period.sides(), Vector3::repeat(drawn.period.sides().x));
+    }
+}

@@ -1,5 +1,7 @@
 //! Which colour each particle gets: that of a profile drawn from those of its category.
 
+#![allow(clippy::cast_possible_truncation, reason = "colours are f32 in a solid")]
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_anneal::Packing;

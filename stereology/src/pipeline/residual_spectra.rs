@@ -1,5 +1,7 @@
 //! Is the fine detail of the solid as coarse or fine as the photograph's? Their power spectra.
 
+#![allow(clippy::cast_possible_truncation, reason = "pictures are at most 512 pixels wide")]
+
 use image::RgbImage;
 use ndarray::{Array2, ArrayView3};
 use stereology_spectrum::{SpectrumError, periodic_component, radial_spectrum};

@@ -1,5 +1,7 @@
 //! The whole chain: a photograph in, a solid out, and what tells whether to trust it.
 
+#![allow(clippy::cast_possible_truncation, reason = "colours are f32 in a solid")]
+
 use crate::pipeline::colouring::particle_colours;
 use crate::pipeline::{
     DensityError, DensityOptions, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes, Population,

@@ -1,5 +1,7 @@
 //! The loop closed: sections of the finished solid measured like the photograph.
 
+#![allow(clippy::cast_possible_truncation, reason = "pictures are at most 1024 pixels wide")]
+
 use crate::pipeline::{MeasuredProfiles, wasserstein};
 use image::RgbImage;
 use rayon::prelude::*;

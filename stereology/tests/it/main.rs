@@ -1,5 +1,12 @@
 //! The composed chain, against the sample whose solid is known and against analytic spheres.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    clippy::cast_possible_truncation,
+    reason = "tests: a failed step is a failed test, equal means equal"
+)]
+
 mod files;
 mod sample;
 mod spheres;

@@ -105,7 +105,7 @@ impl BinderModel {
     }
 
     /// For a photo of two tones, such as a tomogram or a thin section, where neither is narrow enough for [`fit`](Self::fit): k-means finds the tones, and the binder is the one in thinner threads. Halfway between
-    /// them lies at z = 7. The second value is the distance of the tones over the sum of their scatters; below about 2 they are not two.
+    /// them lies at z = 4.5. The second value is the distance of the tones over the sum of their scatters; below about 2 they are not two.
     ///
     /// # Examples
     ///
@@ -119,7 +119,7 @@ impl BinderModel {
     /// });
     /// let picture = encoded_image(&photo);
     /// let (binder, apart) = BinderModel::fit_two_tones(&picture, 0);
-    /// assert!(apart > 2.0 && binder.distance(&picture)[[10, 10]] > 9.0);
+    /// assert!(apart > 2.0 && binder.distance(&picture)[[10, 10]] > 6.0);
     /// ```
     #[must_use]
     pub fn fit_two_tones(picture: &Array2<[f32; 3]>, seed: u64) -> (Self, f64) {
@@ -149,7 +149,7 @@ impl BinderModel {
             (b, 1)
         };
         let spread = (tones.inertia / samples.len() as f64).sqrt();
-        let mut model = Self::flat(thin, step / 14.0, picture.dim());
+        let mut model = Self::flat(thin, step / 9.0, picture.dim());
         model.share = tones.assignment.iter().filter(|g| **g == group).count() as f64 / samples.len() as f64;
         (model, step / (2.0 * spread))
     }
@@ -200,6 +200,24 @@ impl BinderModel {
     /// Pixels for their scatter: a wide cloud holds many pixels of anything.
     fn score(&self) -> f64 {
         self.share / (self.spread() + WIDE)
+    }
+
+    /// The picture under even light: what the surface adds to its mean over the photo's width and height is taken away.
+    #[must_use]
+    pub fn even_light(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
+        // Means of u² and v² over −1..1 are a third, of the other terms zero.
+        let mean = self.surface.map(|c| (c[0] + (c[3] + c[5]) / 3.0) as f32);
+        let mut out = picture.clone();
+        out.axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(y, mut row)| {
+                for (x, p) in row.iter_mut().enumerate() {
+                    let light = self.light(x, y);
+                    (0..3).for_each(|c| p[c] -= light[c] - mean[c]);
+                }
+            });
+        out
     }
 
     /// Share of the photo's pixels that are binder, 0 to 1.

@@ -95,40 +95,43 @@ pub fn segment(
     report(0.15)?;
     let binder = BinderModel::fit(&colours, options.binder.map(|c| c.map(|v| v as f32)), options.seed);
     report(0.3)?;
-    let mut binder = binder;
     let mut deviation = binder.deviation(&colours);
     let mut distance = deviation.mapv(length);
-    let [low, high] = options.thresholds;
-    let mut clear = stands_out(&distance, low, high);
+    let [low, mut high] = options.thresholds;
+    let mut rounds = ROUNDS;
+    // Holes in a whole region may be binder between particles that touch: only small ones are filled before it is cut.
+    let mut hole_share = HOLE_SHARE;
+    let mut share = binder.share();
+    let connected = options.binder.is_some() || hangs_together(&distance.mapv(|z| z < low));
+    let mut clear = connected && stands_out(&distance, low, high);
     if !clear && options.binder.is_none() {
-        let (two_tones, apart) = BinderModel::fit_two_tones(&colours, options.seed);
-        if apart > TWO_TONES {
-            binder = two_tones;
-            deviation = binder.deviation(&colours);
+        let (tones, apart) = BinderModel::fit_two_tones(&binder.even_light(&colours), options.seed);
+        if apart > if connected { TWO_TONES } else { TWO_TONES_IN_PIECES } {
+            deviation = tones.deviation(&binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing)));
             distance = deviation.mapv(length);
-            clear = true;
+            (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, tones.share(), true);
         }
     }
     let mut mask = hysteresis(&distance, low, high);
     report(0.4)?;
-    let small_hole = |hole: usize, around: usize| hole <= options.min_area.max(around / 20);
-    if options.holes == Holes::Fill {
-        fill_holes(&mut mask, small_hole);
-    }
+    let fill = |mask: &mut Array2<bool>| {
+        if let (Holes::Fill, Some(part)) = (options.holes, hole_share) {
+            fill_holes(mask, |hole, around| hole <= options.min_area.max(around / part));
+        }
+    };
+    fill(&mut mask);
     open(&mut mask);
     // The first outline follows the threshold, so that its cores hold blurred rims; later rounds have cleaner ones.
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         mask = half_contrast(&deviation, &mask);
     }
-    if options.holes == Holes::Fill {
-        fill_holes(&mut mask, small_hole);
-    }
+    fill(&mut mask);
     open(&mut mask);
     report(0.6)?;
     let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
     report(0.75)?;
     let mut labels = split_by_shape(&parts);
-    drop_faint(&mut labels, &distance, high);
+    drop_faint(&mut labels, &distance, high, options.min_area);
     if options.holes == Holes::Fill {
         fill_label_holes(&mut labels);
     }
@@ -140,7 +143,7 @@ pub fn segment(
         });
     }
     out.renumber();
-    out.judge_binder(&binder, clear);
+    out.judge_binder(share, clear);
     report(1.0)?;
     Ok(out)
 }
@@ -300,10 +303,10 @@ impl Segmentation {
         }
     }
 
-    fn judge_binder(&mut self, binder: &BinderModel, clear: bool) {
+    fn judge_binder(&mut self, share: f64, clear: bool) {
         let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
-        if binder.share() < 0.2 {
-            let share = 100.0 * binder.share();
+        if share < 0.2 {
+            let share = 100.0 * share;
             self.findings.push(Finding::new(
                 "no-binder",
                 format!("the likeliest binder covers only {share:.0} % of the photo; {advice}"),
@@ -322,8 +325,22 @@ impl Segmentation {
 
 /// Rounds of refining outlines: the third moves them by less than a tenth of a pixel.
 const ROUNDS: usize = 3;
+/// Holes of less than a twentieth of their region's area are filled before it is cut.
+const HOLE_SHARE: Option<usize> = Some(20);
 /// Distance of two tones over the sum of their scatters from which they are two.
 const TWO_TONES: f64 = 1.69;
+
+/// The same where the likeliest binder is in pieces, which says that it is the particles.
+const TWO_TONES_IN_PIECES: f64 = 1.55;
+
+/// Whether the largest piece of a mask holds at least a third of it: binder surrounds, particles are surrounded.
+fn hangs_together(mask: &Array2<bool>) -> bool {
+    let (pieces, count) = connected_pieces(mask, |m| m);
+    let mut areas = vec![0_usize; count as usize + 1];
+    pieces.iter().for_each(|&p| areas[p as usize] += 1);
+    let all: usize = areas[1..].iter().sum();
+    areas[1..].iter().max().is_some_and(|largest| 3 * largest >= all)
+}
 
 /// Whether the distances to the binder fall into two heaps: as many pixels well beyond the thresholds as between them, nearly.
 fn stands_out(distance: &Array2<f32>, low: f32, high: f32) -> bool {
@@ -332,21 +349,19 @@ fn stands_out(distance: &Array2<f32>, low: f32, high: f32) -> bool {
     beyond as f64 > 0.6 * between as f64
 }
 
-/// Takes away labels of which less than a tenth of the pixels is at least `high` from the binder: flecks of its texture.
-fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, high: f32) {
+/// Takes away labels of fewer than eight times `least` pixels of which less than a tenth is at least `high` from the binder: flecks of its texture.
+fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, high: f32, least: usize) {
     let count = labels.iter().copied().max().unwrap_or(0) as usize + 1;
     let mut sums = vec![(0_usize, 0_usize); count];
     for (&label, z) in labels.iter().zip(distance) {
         sums[label as usize].0 += usize::from(*z >= high);
         sums[label as usize].1 += 1;
     }
-    labels.mapv_inplace(|l| {
-        if l != 0 && 10 * sums[l as usize].0 >= sums[l as usize].1 {
-            l
-        } else {
-            0
-        }
-    });
+    let kept: Vec<bool> = sums
+        .iter()
+        .map(|&(strong, all)| all >= 8 * least || 10 * strong >= all)
+        .collect();
+    labels.mapv_inplace(|l| if l != 0 && kept[l as usize] { l } else { 0 });
 }
 
 /// Labels whose pixels form several pieces, increasing.

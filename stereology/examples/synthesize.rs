@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release --example synthesize -p stereology -- [PHOTO SHAPE OUT.png]`
 
+#![expect(clippy::print_stdout, reason = "an example shows its result")]
+
 use std::ops::ControlFlow;
 use stereology::pipeline::{ParticleTypes, SynthesisOptions, synthesize};
 use stereology::{sample, segment, shape::Body, volume::SlicePlane};

@@ -131,7 +131,7 @@ fn grains(bodies: &[UnitBody], types: &ParticleTypes, period: &PeriodicBox) -> R
         let of = &CATEGORIES[category];
         let size = of.median_size * (of.sigma * normal(&mut rng)).exp();
         let shape = usize::from(rng.random::<f64>() >= types.types()[0].share);
-        if size < SIZE_LIMITS[0] || size > SIZE_LIMITS[1] {
+        if !(SIZE_LIMITS[0]..=SIZE_LIMITS[1]).contains(&size) {
             continue;
         }
         let grain = Grain {

@@ -344,7 +344,7 @@ fn has_word(line: &str, word: &str) -> bool {
         let before = line[..at].chars().next_back();
         let after = line[at + word.len()..].chars().next();
         let in_string = line[..at].matches('"').count() % 2 == 1;
-        !in_string && !before.is_some_and(of_a_name) && !(after.is_some_and(of_a_name) && !word.ends_with('!'))
+        !in_string && !before.is_some_and(of_a_name) && (word.ends_with('!') || !after.is_some_and(of_a_name))
     })
 }
 

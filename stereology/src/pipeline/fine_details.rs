@@ -1,7 +1,7 @@
 //! The residual of the photograph, synthesised again in three dimensions: section 4.3.
 
 use crate::pipeline::Warning;
-use ndarray::{Array2, Array4};
+use ndarray::{Array2, Array4, Axis};
 use std::ops::ControlFlow;
 use stereology_pyramid::{Exemplar, TextureError, TextureOptions, TextureReport, synthesize_volume_with_report};
 use stereology_segment::Segmentation;
@@ -23,7 +23,8 @@ pub struct FineDetails {
 /// Synthesises tileable residual volumes of `voxels`³ at the photograph's pixel scale, one from the pixels of the binder, one from those of all particles.
 ///
 /// The two are told apart because a particle's inside looks unlike the binder; particles are pooled because one profile alone is too small a sample (the
-/// paper's own finding). Pixels next to a border belong to neither: blur mixes both there. The period is `voxels` × `pixel`, whatever the photograph's size.
+/// paper's own finding). Pixels near a border belong to neither, since blur mixes both there; nor do pixels of the binder whose colour is nearer to a
+/// category of particles, with those around them: these are particles too small to be profiles, which would come back as specks. The period is `voxels` × `pixel`, whatever the photograph's size.
 ///
 /// # Errors
 ///
@@ -36,13 +37,11 @@ pub fn fine_details(
     options: &TextureOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<FineDetails, TextureError> {
-    let inner = inner_pixels(&segmentation.labels);
-    let binder_mask = ndarray::Zip::from(&segmentation.labels)
-        .and(&inner)
-        .map_collect(|&label, &inner| inner && label == 0);
-    let particle_mask = ndarray::Zip::from(&segmentation.labels)
-        .and(&inner)
-        .map_collect(|&label, &inner| inner && label > 0);
+    let inner = far_from(&borders(&segmentation.labels), BORDER);
+    let no_fines = far_from(&missed_fines(segmentation), BORDER);
+    let labels = &segmentation.labels;
+    let binder_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] == 0 && inner[p] && no_fines[p]);
+    let particle_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] > 0 && inner[p]);
     let mut warnings = Vec::new();
     let mut part = |mask: &Array2<bool>, of: &str, from: f64, seed: u64| {
         let exemplar = Exemplar::new(residual.view()).with_mask(mask.view());
@@ -76,12 +75,76 @@ pub fn fine_details(
     })
 }
 
-/// Pixels whose eight neighbours carry the same label.
-fn inner_pixels(labels: &Array2<u32>) -> Array2<bool> {
+/// How many pixels from a border blur reaches.
+const BORDER: usize = 2;
+
+/// Pixels that touch another label.
+fn borders(labels: &Array2<u32>) -> Array2<bool> {
     let (height, width) = labels.dim();
     Array2::from_shape_fn((height, width), |(y, x)| {
-        let rows = y.saturating_sub(1)..(y + 2).min(height);
-        rows.clone()
-            .all(|v| (x.saturating_sub(1)..(x + 2).min(width)).all(|u| labels[[v, u]] == labels[[y, x]]))
+        let other = |v: usize, u: usize| labels[[v, u]] != labels[[y, x]];
+        (x + 1 < width && other(y, x + 1))
+            || (x > 0 && other(y, x - 1))
+            || (y + 1 < height && other(y + 1, x))
+            || (y > 0 && other(y - 1, x))
     })
+}
+
+/// Pixels of the binder that are nearer in colour to a category of particles.
+fn missed_fines(segmentation: &Segmentation) -> Array2<bool> {
+    let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
+    let photo = segmentation.photo();
+    let binder = segmentation.binder.colour;
+    Array2::from_shape_fn(segmentation.labels.dim(), |(y, x)| {
+        #[allow(clippy::cast_possible_truncation, reason = "a picture's sides are u32")]
+        let pixel = photo.get_pixel(x as u32, y as u32).0.map(|c| f64::from(c) / 255.0);
+        let own = distance(pixel, binder);
+        segmentation.labels[[y, x]] == 0
+            && segmentation
+                .categories
+                .iter()
+                .any(|of| distance(pixel, of.colour) < own)
+    })
+}
+
+/// Where no marked pixel lies within `reach` pixels along rows and columns.
+fn far_from(marked: &Array2<bool>, reach: usize) -> Array2<bool> {
+    let spread = |marked: &Array2<bool>, axis: Axis| {
+        let mut near = marked.clone();
+        for (lane, mut out) in marked.lanes(axis).into_iter().zip(near.lanes_mut(axis)) {
+            for (i, _) in lane.iter().enumerate().filter(|(_, marked)| **marked) {
+                (i.saturating_sub(reach)..(i + reach + 1).min(lane.len())).for_each(|k| out[k] = true);
+            }
+        }
+        near
+    };
+    spread(&spread(marked, Axis(0)), Axis(1)).mapv(|near| !near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{borders, far_from};
+    use ndarray::Array2;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// As many pixels are far as lie outside the union of the squares about the marked ones.
+        #[test]
+        fn far_is_outside_every_square(marks in prop::collection::vec((0_usize..20, 0_usize..30), 0..6), reach in 0_usize..5) {
+            let mut marked = Array2::from_elem((20, 30), false);
+            marks.iter().for_each(|&(y, x)| marked[[y, x]] = true);
+            for ((y, x), &far) in far_from(&marked, reach).indexed_iter() {
+                prop_assert_eq!(far, marks.iter().all(|&(v, u)| y.abs_diff(v) > reach || x.abs_diff(u) > reach));
+            }
+        }
+    }
+
+    /// The border of a square of side 10 has 36 pixels inside and 40 outside.
+    #[test]
+    fn a_border_has_two_sides() {
+        let labels = Array2::from_shape_fn((30, 30), |(y, x)| {
+            u32::from((10..20).contains(&y) && (10..20).contains(&x))
+        });
+        assert_eq!(borders(&labels).iter().filter(|&&b| b).count(), 76);
+    }
 }

@@ -68,7 +68,7 @@ fn draw_panel(
         .caption(panel.title, ("sans-serif", 17).into_font().color(&INK))
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(0.0..1.0, 0.0..1.08 * top)?;
+        .build_cartesian_2d(0.0..1.0, 0.0..if panel.series.len() > 1 { 1.4 } else { 1.08 } * top)?;
     chart
         .configure_mesh()
         .disable_x_mesh()

@@ -13,12 +13,13 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 5] = [
+    let figures: [(&str, Figure); 6] = [
         ("figure-04-section-likelihood", section_likelihood::draw),
         ("figure-05-10-solid", solids::draw_blocks),
         ("figure-06-residual", solids::draw_residual),
         ("figure-07-density-recovery", density_recovery::draw),
         ("figure-08-recovered-volume", density_recovery::draw_volumes),
+        ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {
         if only.is_none_or(|only| name.contains(only)) {

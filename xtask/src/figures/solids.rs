@@ -10,9 +10,10 @@ use nalgebra::Vector3;
 use ndarray::{Array3, Array4};
 use stereology::pipeline::{ParticleTypes, Synthesis, SynthesisOptions, synthesize};
 use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
-use stereology::render::{BlockOptions, render_block};
+use stereology::render::{BlockOptions, RenderOptions, render_block};
 use stereology::sample;
 use stereology::shape::Body;
+use stereology::volume::SlicePlane;
 
 fn solid() -> Result<Synthesis> {
     let shapes = sample::truth()?.shapes;
@@ -59,6 +60,36 @@ fn voxel(texture: &Array4<f32>, p: &nalgebra::Point3<f64>) -> [f32; 3] {
     [0, 1, 2].map(|channel| texture[[index(p.z, nz), index(p.y, ny), index(p.x, nx), channel]].clamp(0.0, 1.0))
 }
 
+/// The picture of README: the sample, a section of its solid at the same scale, a block of it.
+pub fn draw_readme(folder: &Path) -> Result<()> {
+    let made = solid()?;
+    let side = 420;
+    let photo = crop_imm(&sample::photo()?, 200, 120, side, side).to_image();
+    let plane = SlicePlane::oblique(Vector3::new(1.0, 2.0, 3.0), 90.0)?;
+    let section = made.solid.slice(&plane, side, side, 1.0)?;
+    let options = BlockOptions {
+        picture: RenderOptions::default().with_size(side, side),
+        ..BlockOptions::default()
+    };
+    let block = render_block(&|p| made.solid.colour_at(p), Vector3::repeat(320.0), &options)?;
+    row(&[photo, section, block])
+        .save(folder.join("readme.png"))
+        .context("README's picture cannot be written")
+}
+
+/// Pictures of one size beside each other.
+fn row(parts: &[RgbImage]) -> RgbImage {
+    let (width, height) = parts.first().map_or((0, 0), RgbImage::dimensions);
+    let count = parts.len() as u32;
+    let mut row = RgbImage::from_pixel(count * width + (count - 1) * GAP, height, image::Rgb([255; 3]));
+    for (place, part) in (0_i64..).zip(parts) {
+        replace(&mut row, part, place * i64::from(width + GAP), 0);
+    }
+    row
+}
+
+const GAP: u32 = 8;
+
 /// Figure 6: (a) part of the photograph, (b) its mean colours, (c) the residual, (d) a slice of its synthesis in 3D.
 pub fn draw_residual(folder: &Path) -> Result<()> {
     let made = solid()?;
@@ -79,11 +110,7 @@ pub fn draw_residual(folder: &Path) -> Result<()> {
         part(&made.segmentation.residual_picture()),
         synthesised,
     ];
-    let gap = 8;
-    let mut row = RgbImage::from_pixel(4 * side + 3 * gap, side, image::Rgb([255; 3]));
-    for (place, part) in parts.iter().enumerate() {
-        replace(&mut row, part, i64::try_from(place)? * i64::from(side + gap), 0);
-    }
-    row.save(folder.join("figure-06-residual.png"))
+    row(&parts)
+        .save(folder.join("figure-06-residual.png"))
         .context("figure 6 cannot be written")
 }

@@ -1,5 +1,8 @@
 //! One drawn photo of half a megapixel.
 
+#![allow(missing_docs, reason = "made by criterion's macro")]
+#![allow(clippy::cast_possible_truncation, reason = "levels of a drawn picture")]
+
 use std::{hint::black_box, ops::ControlFlow, time::Duration};
 
 use criterion::{Criterion, criterion_group, criterion_main};

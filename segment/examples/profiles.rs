@@ -1,5 +1,8 @@
 //! Profiles of a photo: `cargo run -p stereology-segment --example profiles -- PHOTO [FOLDER]`; without a photo, of a drawn one.
 
+#![allow(clippy::cast_possible_truncation, reason = "levels of a drawn picture")]
+#![allow(clippy::print_stdout, reason = "a program")]
+
 use std::{error::Error, ops::ControlFlow, path::PathBuf};
 
 use stereology_segment::{SegmentOptions, read_photo, segment, write_labels};

@@ -134,16 +134,7 @@ impl BinderModel {
         };
         let step = squared_distance(&a, &b).sqrt();
         let is_a = picture.mapv(|p| nearest_centre(&p.map(f64::from), &[a, b]) == 0);
-        // Mean depth of each tone: threads are shallow.
-        let depth = |mask: &Array2<bool>| {
-            let depths = distance_transform(mask);
-            let (sum, count) = depths
-                .iter()
-                .filter(|d| **d > 0.0 && d.is_finite())
-                .fold((0.0, 0.0), |(s, n), d| (s + f64::from(*d), n + 1.0));
-            sum / f64::max(count, 1.0)
-        };
-        let (thin, group) = if depth(&is_a) <= depth(&is_a.mapv(|m| !m)) {
+        let (thin, group) = if mean_depth(&is_a) <= mean_depth(&is_a.mapv(|m| !m)) {
             (a, 0)
         } else {
             (b, 1)
@@ -287,6 +278,14 @@ impl BinderModel {
     }
 }
 
+/// Mean distance of a mask's pixels to its outline: threads are shallow, particles deep.
+pub(crate) fn mean_depth(mask: &Array2<bool>) -> f64 {
+    let depths = distance_transform(mask);
+    let inside = depths.iter().filter(|d| **d > 0.0 && d.is_finite());
+    let (sum, count) = inside.fold((0.0, 0.0), |(sum, count), d| (sum + f64::from(*d), count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
 /// Euclidean length.
 pub(crate) fn length(v: [f32; 3]) -> f32 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
@@ -331,8 +330,8 @@ fn fit_surface(inside: &[&Sample], terms: usize) -> [[f64; TERMS]; 3] {
             for j in 0..=i {
                 normal[i][j] += b[i] * b[j];
             }
-            for c in 0..3 {
-                right[c][i] += b[i] * s.colour[c];
+            for (right, colour) in right.iter_mut().zip(s.colour) {
+                right[i] += b[i] * colour;
             }
         }
     }

@@ -6,7 +6,7 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    binder::{BinderModel, length},
+    binder::{BinderModel, length, mean_depth},
     category::{Category, categorise},
     error::SegmentError,
     finding::Finding,
@@ -102,7 +102,7 @@ pub fn segment(
     // Holes in a whole region may be binder between particles that touch: only small ones are filled before it is cut.
     let mut hole_share = HOLE_SHARE;
     let mut share = binder.share();
-    let connected = options.binder.is_some() || hangs_together(&distance.mapv(|z| z < low));
+    let connected = options.binder.is_some() || surrounds(&distance.mapv(|z| z < low));
     let mut clear = connected && stands_out(&distance, low, high);
     if !clear && options.binder.is_none() {
         let (tones, apart) = BinderModel::fit_two_tones(&binder.even_light(&colours), options.seed);
@@ -144,6 +144,7 @@ pub fn segment(
     }
     out.renumber();
     out.judge_binder(share, clear);
+    out.judge_count(&distance, [low, high], options.min_area);
     report(1.0)?;
     Ok(out)
 }
@@ -303,6 +304,21 @@ impl Segmentation {
         }
     }
 
+    /// Pieces of the mask at thresholds a fifth lower and higher.
+    fn judge_count(&mut self, distance: &Array2<f32>, [low, high]: [f32; 2], min_area: usize) {
+        let count = |factor: f32| {
+            let (pieces, count) = connected_pieces(&hysteresis(distance, factor * low, factor * high), |m| m);
+            let mut areas = vec![0_usize; count as usize + 1];
+            pieces.iter().for_each(|&p| areas[p as usize] += 1);
+            areas[1..].iter().filter(|a| **a >= min_area).count()
+        };
+        let (fewer, more) = (count(1.2), count(0.8));
+        let change = 100.0 * fewer.abs_diff(more) as f64 / self.profiles.len().max(1) as f64;
+        if change > UNSTABLE {
+            self.findings.push(Finding::new("unstable-count", format!("moving the thresholds by a fifth either way changes the number of regions by {change:.0} % of the profiles: {more} with lower ones, {fewer} with higher; look at the overlay, or give the thresholds")));
+        }
+    }
+
     fn judge_binder(&mut self, share: f64, clear: bool) {
         let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
         if share < 0.2 {
@@ -323,6 +339,8 @@ impl Segmentation {
     }
 }
 
+/// Change of the number of regions, percent of the profiles, that is worth a warning.
+const UNSTABLE: f64 = 25.0;
 /// Rounds of refining outlines: the third moves them by less than a tenth of a pixel.
 const ROUNDS: usize = 3;
 /// Holes of less than a twentieth of their region's area are filled before it is cut.
@@ -333,13 +351,24 @@ const TWO_TONES: f64 = 1.69;
 /// The same where the likeliest binder is in pieces, which says that it is the particles.
 const TWO_TONES_IN_PIECES: f64 = 1.55;
 
-/// Whether the largest piece of a mask holds at least a third of it: binder surrounds, particles are surrounded.
-fn hangs_together(mask: &Array2<bool>) -> bool {
+/// Whether a mask can be the binder: its largest piece holds at least a third of it; and where the rest hangs together too, the mask is the one in thinner threads.
+fn surrounds(mask: &Array2<bool>) -> bool {
+    let rest = mask.mapv(|m| !m);
+    let share = rest.iter().filter(|m| **m).count() as f64 / rest.len() as f64;
+    let tangled = share > 0.35 && share_of_largest(&rest) > 0.5;
+    share_of_largest(mask) > 1.0 / 3.0 && !(tangled && mean_depth(mask) > mean_depth(&rest))
+}
+
+/// Share of a mask in its largest piece.
+fn share_of_largest(mask: &Array2<bool>) -> f64 {
     let (pieces, count) = connected_pieces(mask, |m| m);
     let mut areas = vec![0_usize; count as usize + 1];
     pieces.iter().for_each(|&p| areas[p as usize] += 1);
     let all: usize = areas[1..].iter().sum();
-    areas[1..].iter().max().is_some_and(|largest| 3 * largest >= all)
+    areas[1..]
+        .iter()
+        .max()
+        .map_or(0.0, |largest| *largest as f64 / all as f64)
 }
 
 /// Whether the distances to the binder fall into two heaps: as many pixels well beyond the thresholds as between them, nearly.

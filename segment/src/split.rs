@@ -18,6 +18,11 @@ const PART_DEPTH: f32 = 3.0;
 /// Difference of mean colour in Lab below which touching parts are one particle.
 const SAME_COLOUR: f64 = 18.0;
 
+/// Height above the neck, pixels, from which two maxima of the smoothed depth are two particles.
+const LEAST_RISE: f32 = 0.7;
+/// The same as a share of the lower maximum.
+const RELATIVE_RISE: f32 = 0.1;
+
 /// What is known of a part of a region.
 #[derive(Clone, Copy, Default)]
 struct Part {
@@ -159,7 +164,7 @@ fn lined(parts: &Array2<u32>) -> Array2<bool> {
 
 /// Parts cut at their necks: the distance transform, smoothed, has one maximum that stands out for each particle, and a watershed gives each its pixels. Numbers from 1, 0 outside.
 ///
-/// A maximum stands out if it is at least 1 pixel and 12 % of its own height above the neck; a relative height keeps large angular particles whole.
+/// A maximum stands out if it is at least 0.7 pixels and a tenth of its own height above the neck; a relative height keeps large angular particles whole.
 ///
 /// # Complexity
 ///
@@ -169,7 +174,7 @@ pub fn split_by_shape(parts: &Array2<u32>) -> Array2<u32> {
     let mask = lined(parts);
     let mut depth = smooth_field(&distance_transform(&mask), 1.0);
     depth.zip_mut_with(&mask, |d, &m| *d = if m { d.min(1e4) } else { 0.0 });
-    let markers = h_maxima(&depth, |height| 1.0_f32.max(0.12 * height));
+    let markers = h_maxima(&depth, |height| LEAST_RISE.max(RELATIVE_RISE * height));
     let mut labels = watershed(&depth, &markers, &mask);
     // The lines between parts go back to the part they were taken from.
     for _ in 0..3 {

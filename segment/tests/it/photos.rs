@@ -163,9 +163,9 @@ fn edge_rules_are_unbiased() {
                 counted[kind][trial] = found.number_per_area * w * h;
             }
         }
-        for kind in 0..2 {
-            let mean = counted[kind].iter().sum::<f64>() / 400.0;
-            let variance = counted[kind].iter().map(|c| (c - mean).powi(2)).sum::<f64>() / 399.0;
+        for (kind, counted) in counted.iter().enumerate() {
+            let mean = counted.iter().sum::<f64>() / 400.0;
+            let variance = counted.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / 399.0;
             let error = (variance / 400.0).sqrt();
             assert!((mean - 1.0).abs() < 5.0 * error, "{rule:?} {kind}: {mean} ± {error}");
         }

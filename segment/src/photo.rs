@@ -2,7 +2,7 @@
 
 use std::{io::Cursor, path::Path};
 
-use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 
 use crate::error::SegmentError;
 
@@ -35,11 +35,20 @@ pub fn read_photo(path: impl AsRef<Path>) -> Result<RgbImage, SegmentError> {
     if reader.format().is_none() {
         return Err(refuse("its first bytes are of no known picture format".into()));
     }
+    if reader.format() == Some(ImageFormat::Jpeg) && !has_end(&bytes) {
+        return Err(refuse("the file is cut short: the JPEG's end is missing".into()));
+    }
     let mut decoder = reader.into_decoder().map_err(|e| refuse(e.to_string()))?;
     let orientation = decoder.orientation().map_err(|e| refuse(e.to_string()))?;
     let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| refuse(e.to_string()))?;
     picture.apply_orientation(orientation);
     Ok(over_white(picture))
+}
+
+/// Whether a JPEG's last scan is followed by the end marker; decoders fill what is missing with grey.
+fn has_end(bytes: &[u8]) -> bool {
+    let last = |marker: u8| bytes.windows(2).rposition(|w| w == [0xff, marker]);
+    last(0xd9) > last(0xda)
 }
 
 /// All bytes of a file that has some.

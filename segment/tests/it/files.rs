@@ -60,6 +60,14 @@ fn bad_photos() {
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(&file, &whole[..whole.len() / 2]).unwrap();
     assert!(matches!(read_photo(&file), Err(SegmentError::Decode { .. })));
+    let file = folder.path().join("photo.jpg");
+    RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]))
+        .save(&file)
+        .unwrap();
+    assert!(read_photo(&file).is_ok());
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 20]).unwrap();
+    assert!(matches!(read_photo(&file), Err(SegmentError::Decode { .. })));
 }
 
 /// Labels of 8 and 16 bits as PNG, and signed ones as TIFF, are read; colours and negative numbers are refused.

@@ -1,10 +1,11 @@
 //! `cargo xtask`: the work on the workspace that is not the program itself.
 
+mod acceptance;
 mod figures;
 mod sample;
 mod tidy;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
@@ -22,6 +23,15 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
+    /// Runs the released program on photographs outside the project and writes docs/acceptance.md
+    Acceptance {
+        /// Folder that holds images/
+        #[arg(long)]
+        data: PathBuf,
+        /// Where the solids go
+        #[arg(long, default_value = "target/acceptance")]
+        results: PathBuf,
+    },
     /// Draws the paper's figures into docs/figures
     Figures {
         /// Only those whose name holds this
@@ -36,6 +46,12 @@ enum Task {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
+        Task::Acceptance { data, results } => acceptance::run(
+            &root()?.join("target/release/stereology"),
+            &data,
+            &results,
+            &root()?.join("docs/acceptance.md"),
+        ),
         Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),

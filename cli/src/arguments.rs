@@ -1,7 +1,10 @@
 //! The command line: what every command understands. The options of a command stand in its module.
 
+use std::path::Path;
+
 use clap::builder::styling::{AnsiColor, Styles};
-use clap::{Args, Parser};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, CommandFactory, Parser};
 
 use crate::commands::Command;
 use crate::values::positive;
@@ -66,11 +69,144 @@ pub struct Everywhere {
     /// Units of length per pixel; without it lengths are pixels
     #[arg(long, global = true, value_name = "UNITS_PER_PIXEL", default_value_t = 1.0, value_parser = positive)]
     pub scale: f64,
+    /// How the program was called.
+    #[arg(skip)]
+    pub invocation: Invocation,
+}
+
+/// How a command was called, for people who want to repeat it: the same wherever and with however many threads it ran.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Invocation {
+    /// The command with all options that were given; files by their names.
+    pub command: String,
+    /// Every option that can change the result, and its value.
+    pub parameters: Vec<(String, String)>,
+}
+
+/// What changes no output, so that it is not repeated.
+const WITHOUT_EFFECT: [&str; 7] = ["json", "threads", "quiet", "strict", "force", "output", "help"];
+
+impl Invocation {
+    /// How `matches`, of the whole program, was called.
+    pub fn of(matches: &ArgMatches) -> Self {
+        let mut invocation = Self::default();
+        let Some((name, given)) = matches.subcommand() else {
+            return invocation;
+        };
+        let mut program = Program::command();
+        program.build();
+        let Some(command) = program.find_subcommand(name) else {
+            return invocation;
+        };
+        let (mut files, mut options) = (String::new(), String::new());
+        for arg in command.get_arguments() {
+            let id = arg.get_id().as_str();
+            if WITHOUT_EFFECT.contains(&id) || given.try_contains_id(id).is_err() {
+                continue;
+            }
+            let values: Vec<String> = given
+                .get_raw(id)
+                .into_iter()
+                .flatten()
+                .map(|value| {
+                    Path::new(value)
+                        .file_name()
+                        .unwrap_or(value)
+                        .to_string_lossy()
+                        .into_owned()
+                })
+                .collect();
+            let shown = if values.is_empty() {
+                "not given".to_owned()
+            } else {
+                values.join("  ")
+            };
+            let by_hand = given.value_source(id) == Some(ValueSource::CommandLine);
+            match arg.get_long() {
+                Some(long) => {
+                    invocation.parameters.push((format!("--{long}"), shown));
+                    if by_hand {
+                        values
+                            .iter()
+                            .for_each(|value| options.push_str(&format!(" --{long} {}", quoted(value))));
+                    }
+                }
+                None => {
+                    invocation.parameters.push((id.to_uppercase(), shown));
+                    values
+                        .iter()
+                        .for_each(|value| files.push_str(&format!(" {}", quoted(value))));
+                }
+            }
+        }
+        let output = if command.get_arguments().any(|arg| arg.get_id() == "output") {
+            " -o out"
+        } else {
+            ""
+        };
+        invocation.command = format!("stereology {name}{files}{output}{options}");
+        invocation
+    }
+}
+
+/// A word as a shell reads it back.
+fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "._-+=:,/".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
 }
 
 fn threads(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(n @ 1..=1024) => Ok(n),
         _ => Err("a number of threads from 1 to 1024 is needed".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Invocation, Program};
+    use clap::CommandFactory;
+
+    #[test]
+    fn an_invocation_can_be_repeated_anywhere() {
+        let of = |words: &[&str]| Invocation::of(&Program::command().try_get_matches_from(words).unwrap());
+        let invocation = of(&[
+            "stereology",
+            "synthesize",
+            "/home/me/my photo.jpg",
+            "-o",
+            "/tmp/x",
+            "--shape",
+            "rock:1=0.5",
+            "--shape",
+            "a.obj",
+            "--threads",
+            "2",
+            "--seed",
+            "3",
+        ]);
+        assert_eq!(
+            invocation.command,
+            "stereology synthesize 'my photo.jpg' -o out --shape rock:1=0.5 --shape a.obj --seed 3"
+        );
+        let value = |name: &str| {
+            invocation
+                .parameters
+                .iter()
+                .find(|(of, _)| of == name)
+                .map(|(_, value)| value.as_str())
+        };
+        assert_eq!(
+            (value("--seed"), value("--bins"), value("--box"), value("--threads")),
+            (Some("3"), Some("10"), Some("not given"), None)
+        );
+        assert_eq!(
+            of(&["stereology", "synthesize", "-o", "x"]).command,
+            "stereology synthesize -o out"
+        );
     }
 }

@@ -13,7 +13,6 @@ mod outputs;
 mod particle_files;
 mod profile_table;
 mod progress;
-#[allow(dead_code, unused_imports)] // until `synthesize` writes it
 mod report;
 mod values;
 mod warnings;
@@ -21,13 +20,21 @@ mod warnings;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
 
-use crate::arguments::Program;
+use crate::arguments::{Invocation, Program};
 use crate::failure::Failure;
 
 fn main() -> ExitCode {
-    let program = Program::parse();
+    let matches = Program::command().get_matches();
+    let program = Program::from_arg_matches(&matches).map(|mut program| {
+        program.everywhere.invocation = Invocation::of(&matches);
+        program
+    });
+    let program = match program {
+        Ok(program) => program,
+        Err(error) => error.exit(),
+    };
     match run(&program) {
         Ok(code) => code,
         Err(failure) => {

@@ -29,7 +29,6 @@ pub fn significant(value: f64) -> String {
 }
 
 /// A count with thousands apart: `12,345`.
-#[allow(dead_code)] // until `synthesize` writes its report
 pub fn counted(value: u64) -> String {
     thousands(&value.to_string())
 }

@@ -3,6 +3,8 @@
 use std::io::{self, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -71,5 +73,56 @@ impl Step {
 impl Drop for Step {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// The progress of several steps, one after the other, and how long each took.
+#[derive(Debug)]
+pub struct Stages {
+    quiet: bool,
+    running: Mutex<Running>,
+}
+
+#[derive(Debug, Default)]
+struct Running {
+    step: Option<(&'static str, Step, Instant)>,
+    seconds: Vec<(&'static str, f64)>,
+}
+
+impl Stages {
+    /// Begins, with no step yet.
+    pub fn begin(quiet: bool) -> Self {
+        Self {
+            quiet,
+            running: Mutex::default(),
+        }
+    }
+
+    /// Told which step is at work and how far it is; breaks after Ctrl-C.
+    pub fn at(&self, name: &'static str, done: f64) -> ControlFlow<()> {
+        let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+        if running.step.as_ref().is_none_or(|(of, ..)| *of != name) {
+            running.end();
+            running.step = Some((name, Step::begin(name, self.quiet), Instant::now()));
+        }
+        match &running.step {
+            Some((_, step, _)) => step.at(done),
+            None => ControlFlow::Continue(()),
+        }
+    }
+
+    /// Ends the last step: seconds by step.
+    pub fn end(self) -> Vec<(&'static str, f64)> {
+        let mut running = self.running.into_inner().unwrap_or_else(PoisonError::into_inner);
+        running.end();
+        running.seconds
+    }
+}
+
+impl Running {
+    fn end(&mut self) {
+        if let Some((name, _, since)) = self.step.take() {
+            self.seconds.push((name, since.elapsed().as_secs_f64()));
+        }
     }
 }

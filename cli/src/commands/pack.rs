@@ -111,6 +111,13 @@ pub fn pack_failure(error: PackError) -> Failure {
     }
 }
 
+/// The shapes that are packed.
+struct Shapes {
+    names: Vec<String>,
+    shares: Vec<f64>,
+    bodies: Vec<UnitBody>,
+}
+
 impl Pack {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = PackOptions::default()
@@ -126,7 +133,7 @@ impl Pack {
             check_file(path, everywhere.force)?;
         }
         let started = Instant::now();
-        let (names, shares, bodies) = self.shapes()?;
+        let Shapes { names, shares, bodies } = self.shapes()?;
         let (grains, period) = self.grains(&bodies, &shares, everywhere)?;
         let requested = total_volume(&bodies, &grains).or_fail()? / period.volume();
         let step = Step::begin("packing", everywhere.quiet);
@@ -176,8 +183,7 @@ impl Pack {
         Ok(answer)
     }
 
-    /// Names, shares and bodies of the shapes.
-    fn shapes(&self) -> Result<(Vec<String>, Vec<f64>, Vec<UnitBody>), Failure> {
+    fn shapes(&self) -> Result<Shapes, Failure> {
         let sphere = [ShapeShare {
             shape: "sphere".to_owned(),
             fraction: None,
@@ -187,15 +193,14 @@ impl Pack {
         } else {
             &self.shape
         };
-        let bodies = shapes
-            .iter()
-            .map(|shape| Ok(UnitBody::new(&body(&shape.shape)?)))
-            .collect::<Result<_, Failure>>()?;
-        Ok((
-            shapes.iter().map(|shape| shape.shape.clone()).collect(),
-            shares(shapes).or_usage("--shape")?,
-            bodies,
-        ))
+        Ok(Shapes {
+            names: shapes.iter().map(|shape| shape.shape.clone()).collect(),
+            shares: shares(shapes).or_usage("--shape")?,
+            bodies: shapes
+                .iter()
+                .map(|shape| Ok(UnitBody::new(&body(&shape.shape)?)))
+                .collect::<Result<_, Failure>>()?,
+        })
     }
 
     /// The particles' sizes, shapes and categories, and their box.
@@ -208,7 +213,7 @@ impl Pack {
         let seed = everywhere.seed;
         let scale = everywhere.scale;
         if let Some(table) = &self.sizes.densities {
-            return self.from_densities(table, bodies, shares, everywhere);
+            return self.grains_of_table(table, bodies, shares, everywhere);
         }
         let fraction = self.fraction.unwrap_or(0.5);
         let cube = |side: f64| PeriodicBox::new(Vector3::repeat(side * scale)).or_usage("--box");
@@ -269,7 +274,7 @@ impl Pack {
         Ok((grains, period))
     }
 
-    fn from_densities(
+    fn grains_of_table(
         &self,
         table: &Path,
         bodies: &[UnitBody],

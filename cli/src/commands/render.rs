@@ -3,16 +3,23 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Vector3;
+use stereology::render::{BlockOptions, Camera, RenderOptions, render_block, render_mesh_with_progress};
+use stereology::shape::{TriangleMesh, read_mesh};
+use stereology::volume::Solid;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::Failure;
+use crate::commands::slice::open_solid;
+use crate::failure::{Explain, Failure};
+use crate::outputs::{check_file, write_png};
+use crate::progress::{Step, go_on};
 use crate::values::{Triple, count};
 
 /// Renders a finished solid: one period of it as a block, or a mesh carved from it
 ///
 /// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn as the paper shows it, with three faces seen. A mesh (.obj, .stl,
-/// .ply) is placed with its longest side on one period of the solid, and its surface shows the solid's colours there.
+/// .ply) is placed with its longest side on one period of the solid, and its surface shows the solid's colours there; its z axis points up.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology render out --mesh bunny.obj --camera 2,-3,1.5 -o bunny.png")]
 pub struct Render {
@@ -34,7 +41,80 @@ pub struct Render {
 }
 
 impl Render {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `render`"))
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        check_file(&self.output, everywhere.force)?;
+        let solid = open_solid(&self.solid)?.solid;
+        let size = self.size as u32;
+        let step = Step::begin("rendering", everywhere.quiet);
+        let picture = match &self.mesh {
+            None => {
+                let mut options = BlockOptions::default().with_size(size, size);
+                if let Some(Triple(towards)) = self.camera {
+                    options.camera = camera(options.camera, towards)?;
+                }
+                render_block(&|p| solid.colour_at(p), solid.period().sides(), &options).or_fail()?
+            }
+            Some(path) => {
+                let mesh = placed(read_mesh(path).at(path)?, &solid);
+                let towards = self.camera.unwrap_or(Triple([1.0, -1.6, 0.8])).0;
+                let camera = camera(
+                    Camera {
+                        up: Vector3::z_axis(),
+                        ..Camera::default()
+                    },
+                    towards,
+                )?;
+                let options = RenderOptions::default().with_size(size, size);
+                render_mesh_with_progress(&mesh, &|p| solid.colour_at(p), &camera, &options, &|done| step.at(done))
+                    .at(path)?
+            }
+        };
+        drop(step);
+        go_on()?;
+        write_png(&self.output, &picture)?;
+        let mut answer = Answer::new("render");
+        answer
+            .field("width", picture.width())
+            .field("height", picture.height())
+            .line(format!(
+                "{} x {} pixels written to {}",
+                picture.width(),
+                picture.height(),
+                self.output.display()
+            ));
+        Ok(answer)
     }
+}
+
+/// The mesh with its longest side on one period of the solid, from the origin.
+fn placed(mut mesh: TriangleMesh, solid: &Solid) -> TriangleMesh {
+    let low = mesh
+        .vertices
+        .iter()
+        .fold(Vector3::repeat(f64::INFINITY), |low, v| low.inf(&v.coords));
+    let high = mesh
+        .vertices
+        .iter()
+        .fold(Vector3::repeat(f64::NEG_INFINITY), |high, v| high.sup(&v.coords));
+    let scale = solid.period().sides().max() / (high - low).max();
+    if scale.is_finite() && scale > 0.0 {
+        mesh.vertices
+            .iter_mut()
+            .for_each(|v| v.coords = (v.coords - low) * scale);
+    }
+    mesh
+}
+
+/// The camera in the direction `towards`, z up.
+fn camera(from: Camera, towards: [f64; 3]) -> Result<Camera, Failure> {
+    let [x, y, z] = towards;
+    let length = x.hypot(y).hypot(z);
+    if !(length.is_finite() && length > 0.0) {
+        return Err(Failure::usage("--camera needs a direction, such as 1,-1.6,0.8"));
+    }
+    Ok(Camera {
+        azimuth: x.atan2(-y).to_degrees(),
+        elevation: (z / length).asin().to_degrees().clamp(-89.0, 89.0),
+        ..from
+    })
 }

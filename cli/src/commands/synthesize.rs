@@ -3,12 +3,31 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use image::{Rgb, RgbImage, imageops};
+use serde_json::{Map, Value, json};
+use stereology::anneal::PackOptions;
+use stereology::files;
+use stereology::grid::Format;
+use stereology::pipeline::{
+    self, Comparison, DensityOptions, Extent, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions,
+};
+use stereology::pyramid::TextureReport;
+use stereology::render::{BlockOptions, render_block};
+use stereology::sample;
+use stereology::segment::{read_labels, read_photo};
+use stereology::volume::{Axis, Channel, SlicePlane};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
+use crate::commands::pack::pack_failure;
+use crate::commands::unfold::{Choices as Unfolding, Spacing, types};
 use crate::commands::{pack, segment, texture, unfold};
-use crate::failure::Failure;
-use crate::values::{count, positive, share};
+use crate::failure::{Explain, Failure};
+use crate::numbers::{counted, percent, significant};
+use crate::outputs::{OutputFolder, write_json, write_png, write_text};
+use crate::progress::{Stages, go_on};
+use crate::report::{self, Pictures, report_input};
+use crate::values::{ShapeShare, count, positive, share};
 
 /// From a photograph of a cut to the solid it came from, and a report that tells whether to trust it
 ///
@@ -66,8 +85,283 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
+/// Bootstrap replicates if not given: the report shows intervals.
+const REPLICATES: usize = 200;
+/// White between photograph and section in comparison.png, in pixels.
+const GAP: u32 = 8;
+/// Depths of the sections that the report shows, as fractions of the box's side: across z and across x.
+const DEPTHS: [(Axis, f64); 2] = [(Axis::Z, 0.37), (Axis::X, 0.61)];
+
 impl Synthesize {
-    pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        Err(Failure::not_available("the command `synthesize`"))
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let options = self.options(everywhere)?;
+        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let (photo, name) = self.photo()?;
+        let types = self.types()?;
+        let labels = self
+            .segment
+            .labels
+            .as_ref()
+            .map(|path| read_labels(path).at(path))
+            .transpose()?;
+        let stages = Stages::begin(everywhere.quiet);
+        let synthesis = pipeline::synthesize(&photo, labels, &types, &options, &|step, done| {
+            stages.at(step.name(), done)
+        })
+        .map_err(|error| self.failure(error))?;
+        go_on()?;
+        let mut answer = self.answer(&synthesis);
+        self.write(&folder, &synthesis, &types, &name, everywhere, &stages)?;
+        write_json(&folder.file("summary.json"), &answer.summary())?;
+        go_on()?;
+        folder.publish()?;
+        let seconds: Map<String, Value> = stages
+            .end()
+            .into_iter()
+            .map(|(step, seconds)| (step.to_owned(), json!(seconds)))
+            .collect();
+        answer.seconds(seconds);
+        answer.line(format!("open {}", self.output.join("report.html").display()));
+        Ok(answer)
     }
+
+    fn options(&self, everywhere: &Everywhere) -> Result<SynthesisOptions, Failure> {
+        let seed = everywhere.seed;
+        let unfold = &self.unfold;
+        let edges = match (&unfold.edges, unfold.spacing) {
+            (None, Spacing::Equal) => None,
+            // Lengths are in the unit of the results here.
+            _ => Some(unfold.size_edges(&[], 1.0)?),
+        };
+        Ok(SynthesisOptions {
+            pixel: everywhere.scale,
+            segment: self.segment.options(seed),
+            densities: DensityOptions {
+                bins: unfold.bins,
+                edges,
+                max_size: unfold.max_size,
+                sizes: unfold.sizes(),
+                unfold: Unfolding {
+                    bootstrap: unfold.bootstrap.or(Some(REPLICATES)),
+                    ..unfold.clone()
+                }
+                .unfold_options(1.0, seed)?,
+            },
+            extent: match (self.solid.side, self.solid.count) {
+                (Some(side), _) => Extent::Side(side),
+                (None, Some(count)) => Extent::Count(count),
+                (None, None) => Extent::Auto,
+            },
+            fraction: self.solid.fraction,
+            pack: PackOptions::default()
+                .with_mode(self.solid.pack_mode.way()?)
+                .with_seed(seed),
+            texture: self.texture.options(self.texture_mode, seed)?,
+            texture_voxels: self.solid.texture_voxels,
+            seed,
+        })
+    }
+
+    /// The photograph and its name.
+    fn photo(&self) -> Result<(RgbImage, String), Failure> {
+        let Some(path) = &self.photo else {
+            return Ok((sample::photo().or_fail()?, "The built-in sample".to_owned()));
+        };
+        let name = path
+            .file_name()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy()
+            .into_owned();
+        Ok((read_photo(path).at(path)?, name))
+    }
+
+    fn types(&self) -> Result<ParticleTypes, Failure> {
+        if self.photo.is_some() || !self.unfold.shape.is_empty() {
+            return self.unfold.types();
+        }
+        let shapes = sample::truth().or_fail()?.shapes;
+        types(
+            &shapes
+                .into_iter()
+                .map(|of| ShapeShare {
+                    shape: of.shape,
+                    fraction: Some(of.share),
+                })
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    fn failure(&self, error: SynthesisError) -> Failure {
+        match error {
+            SynthesisError::Pack(error) => pack_failure(error),
+            // What was wrong with the photograph or its labels: they are named.
+            SynthesisError::Segment(error) => match self.segment.labels.as_ref().or(self.photo.as_ref()) {
+                Some(path) => Failure::run(format!("{}: {error}", path.display())),
+                None => Failure::run(error),
+            },
+            other if other.is_cancelled() => Failure::stopped(),
+            other => Failure::run(other),
+        }
+    }
+
+    fn answer(&self, synthesis: &Synthesis) -> Answer {
+        let object = |fields: Vec<(&'static str, Value)>| -> Value {
+            Value::Object(
+                fields
+                    .into_iter()
+                    .map(|(name, value)| (name.to_owned(), value))
+                    .collect(),
+            )
+        };
+        let figures = |of: &Comparison| {
+            vec![
+                ("profiles_photo", json!(of.profiles_photo)),
+                ("profiles_synthetic", json!(of.profiles_synthetic)),
+                ("size_w1", json!(of.size_w1)),
+                ("area_fraction_photo", json!(of.area_fraction_photo)),
+                ("area_fraction_synthetic", json!(of.area_fraction_synthetic)),
+                ("colour_distance", json!(of.colour_distance)),
+            ]
+        };
+        let (packing, population, verification) = (&synthesis.packing, &synthesis.population, &synthesis.verification);
+        let mut compared = figures(&verification.exact);
+        compared.push((
+            "resegmented",
+            verification
+                .resegmented
+                .as_ref()
+                .map_or(Value::Null, |again| object(figures(again))),
+        ));
+        let report = |of: &Option<TextureReport>| {
+            of.as_ref().map_or(
+                Value::Null,
+                |of| json!({ "levels": of.levels, "band_errors": of.band_errors }),
+            )
+        };
+        let pixel = synthesis.details.residual.voxel;
+        let sides: [f64; 3] = packing.sides().into();
+        let mut unfolded = unfold::figures(&synthesis.densities.all, self.unfold.kernel_name());
+        unfolded.push(("profile_edges", json!(synthesis.densities.profile_edges)));
+        unfolded.push((
+            "size_and_colour_p_value",
+            json!(synthesis.densities.association.p_value),
+        ));
+        let mut answer = Answer::new("synthesize");
+        answer
+            .field("segment", object(segment::figures(&synthesis.segmentation, pixel)))
+            .field("unfold", object(unfolded))
+            .field(
+                "pack",
+                json!({
+                    "particles": packing.particles().len(),
+                    "box": sides,
+                    "fraction": packing.fraction(),
+                    "requested_fraction": population.fraction,
+                    "unfolded_fraction": population.unfolded_fraction,
+                    "density_factor": population.density_factor,
+                    "max_overlap": packing.max_overlap(),
+                    "certified": packing.max_overlap() <= 0.0,
+                    "iterations": packing.iterations(),
+                }),
+            )
+            .field(
+                "texture",
+                json!({
+                    "shape": synthesis.details.residual.binder.shape()[..3].to_vec(),
+                    "mode": self.texture_mode.name(),
+                    "iterations": self.texture.iterations,
+                    "binder": report(&synthesis.details.binder),
+                    "particles": report(&synthesis.details.particles),
+                }),
+            )
+            .field("verification", object(compared));
+        for warning in &synthesis.warnings {
+            answer.warn(warning.clone());
+        }
+        let exact = &verification.exact;
+        answer
+            .line(format!(
+                "{} profiles, {} of the area",
+                exact.profiles_photo,
+                percent(exact.area_fraction_photo)
+            ))
+            .line(format!(
+                "{} particles in a box of {}, {} of the volume, none overlap",
+                counted(packing.particles().len() as u64),
+                sides.map(significant).join(" x "),
+                percent(packing.fraction())
+            ))
+            .line(format!(
+                "sections of the solid: area fraction {}, profile sizes apart by {} of their mean",
+                percent(exact.area_fraction_synthetic),
+                percent(exact.size_w1)
+            ));
+        answer
+    }
+
+    fn write(
+        &self,
+        folder: &OutputFolder,
+        synthesis: &Synthesis,
+        types: &ParticleTypes,
+        name: &str,
+        everywhere: &Everywhere,
+        stages: &Stages,
+    ) -> Result<(), Failure> {
+        let (solid, pixel) = (&synthesis.solid, everywhere.scale);
+        segment::write_files(folder, &synthesis.segmentation, pixel)?;
+        files::write_densities(folder.file("densities.csv"), &synthesis.densities).or_fail()?;
+        files::save_solid(folder.file(""), solid, &synthesis.details.residual, types).or_fail()?;
+        solid
+            .write_voxels(
+                folder.file("volume.npy"),
+                Format::Npy,
+                self.solid.voxels,
+                Channel::Rgb,
+                &|done| stages.at("voxels", done),
+            )
+            .or_fail()?;
+        let _ = stages.at("pictures", 0.0);
+        let pictures = self.pictures(synthesis, pixel)?;
+        go_on()?;
+        write_png(&folder.file("cube.png"), &pictures.cube)?;
+        if let Some(section) = pictures.sections.first() {
+            write_png(
+                &folder.file("comparison.png"),
+                &beside(synthesis.segmentation.photo(), section),
+            )?;
+        }
+        let input = report_input(synthesis, types, pictures, name, &everywhere.invocation);
+        write_text(&folder.file("report.html"), &report::page(&input))
+    }
+
+    fn pictures(&self, synthesis: &Synthesis, pixel: f64) -> Result<Pictures, Failure> {
+        let solid = &synthesis.solid;
+        let (width, height) = synthesis.segmentation.photo().dimensions();
+        let mut pictures = Pictures {
+            cube: render_block(
+                &|p| solid.colour_at(p),
+                solid.period().sides(),
+                &BlockOptions::default(),
+            )
+            .or_fail()?,
+            sections: Vec::new(),
+        };
+        for (axis, share) in DEPTHS {
+            let plane = SlicePlane::across(axis, share * solid.period().sides()[axis.index()]);
+            pictures
+                .sections
+                .push(solid.slice(&plane, width, height, pixel).or_fail()?);
+        }
+        Ok(pictures)
+    }
+}
+
+/// Two pictures of one height side by side.
+fn beside(left: &RgbImage, right: &RgbImage) -> RgbImage {
+    let height = left.height().max(right.height());
+    let mut both = RgbImage::from_pixel(left.width() + GAP + right.width(), height, Rgb([255; 3]));
+    imageops::replace(&mut both, left, 0, 0);
+    imageops::replace(&mut both, right, i64::from(left.width() + GAP), 0);
+    both
 }

@@ -88,7 +88,8 @@ impl Mode {
         }
     }
 
-    fn name(self) -> &'static str {
+    /// Its name.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Slices => "slices",
             Self::Oriented => "oriented",

@@ -1,6 +1,6 @@
 //! `stereology unfold`: profiles per area -> particles per volume.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -30,6 +30,8 @@ use crate::warnings::Warning;
 /// PROFILES.csv has a column `size` (diameter of the circle with the profile's area) or `area`; if present, `type` (0-based index of --shape), `category`,
 /// `weight` (multiplies the count) and `slice` are used too. Other columns are ignored; the `profiles.csv` of `stereology segment` is such a table. --area is
 /// the total area examined: without it there are no absolute numbers.
+///
+/// With --scale all lengths given here, in the table and in options, are multiplied by it.
 ///
 /// With several --shape and no `type` column all types share one size distribution in the given fractions (eqs. 10-12); with types each has its own (eq. 9).
 #[derive(Args, Debug)]
@@ -79,7 +81,7 @@ pub struct Choices {
     /// Sizes spread over each bin, or all at its upper edge (the paper's) [default: integrated; with --method paper: upper-edge]
     #[arg(long, value_enum)]
     pub kernel: Option<Kernel>,
-    /// Bootstrap replicates for intervals
+    /// Bootstrap replicates for intervals [default: none; synthesize: 200]
     #[arg(long, value_name = "B", value_parser = count)]
     pub bootstrap: Option<usize>,
     /// Nominal coverage of the intervals
@@ -176,7 +178,7 @@ impl Choices {
     }
 
     /// Edges of the size bins, for profiles of these sizes.
-    fn size_edges(&self, profiles: &[TableProfile], scale: f64) -> Result<Vec<f64>, Failure> {
+    pub fn size_edges(&self, profiles: &[TableProfile], scale: f64) -> Result<Vec<f64>, Failure> {
         if let Some(Edges(edges)) = &self.edges {
             return Ok(edges.iter().map(|edge| edge * scale).collect());
         }
@@ -218,9 +220,16 @@ pub fn types(shapes: &[ShapeShare]) -> Result<ParticleTypes, Failure> {
     let bodies = shapes
         .iter()
         .zip(shares)
-        .map(|(shape, share)| Ok((shape.shape.clone(), body(&shape.shape)?, share)))
+        .map(|(shape, share)| Ok((file_name(&shape.shape), body(&shape.shape)?, share)))
         .collect::<Result<_, Failure>>()?;
     ParticleTypes::new(bodies).or_fail()
+}
+
+/// Outputs hold no paths: a mesh file goes by its name.
+fn file_name(shape: &str) -> String {
+    Path::new(shape)
+        .file_name()
+        .map_or_else(|| shape.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// What was found, of one type or of several together.
@@ -373,26 +382,8 @@ impl Unfold {
     fn answer(&self, found: &Found, profiles: &[TableProfile]) -> Answer {
         let Found { sum, by_type, .. } = found;
         let mut answer = Answer::new("unfold");
-        let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
-            let intervals = sum.intervals.as_ref()?;
-            Some(intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
-        };
-        answer
-            .field("edges", sum.edges.clone())
-            .field("number_density", sum.number_density.clone())
-            .field("lower", ends(|interval| interval.lower))
-            .field("upper", ends(|interval| interval.upper));
-        for (name, estimate) in [
-            ("total", sum.total),
-            ("mean_size", sum.mean_size),
-            ("volume_fraction", sum.volume_fraction),
-        ] {
-            answer.field(name, estimate.value);
-            if let Some(interval) = estimate.interval {
-                answer
-                    .field(&format!("{name}_lower"), interval.lower)
-                    .field(&format!("{name}_upper"), interval.upper);
-            }
+        for (name, value) in figures(sum, self.choices.kernel_name()) {
+            answer.field(name, value);
         }
         if !by_type.is_empty() {
             let names = self.choices.shape.iter().map(|shape| &shape.shape);
@@ -402,18 +393,6 @@ impl Unfold {
                 .collect();
             answer.field("types", types);
         }
-        answer
-            .field("profiles", sum.profiles)
-            .field("observed", sum.observed.clone())
-            .field("refolded", sum.refolded.clone())
-            .field("deviance", sum.deviance)
-            .field("degrees_of_freedom", sum.degrees_of_freedom)
-            .field("condition_number", sum.condition_number)
-            .field("penalty", Value::Null)
-            .field("method", sum.method.name())
-            .field("kernel", self.choices.kernel_name())
-            .field("threshold", sum.threshold)
-            .field("clamped_bins", sum.clamped_bins.len());
         for finding in &sum.findings {
             answer.warn(Warning::new(finding.code(), finding.to_string()));
         }
@@ -468,4 +447,46 @@ impl Unfold {
         }
         answer
     }
+}
+
+/// Fields of the JSON object that an unfolding fills.
+pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
+    let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
+        let intervals = found.intervals.as_ref()?;
+        Some(intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
+    };
+    let mut fields = vec![
+        ("edges", json!(found.edges)),
+        ("number_density", json!(found.number_density)),
+        ("lower", json!(ends(|interval| interval.lower))),
+        ("upper", json!(ends(|interval| interval.upper))),
+    ];
+    for (names, estimate) in [
+        (["total", "total_lower", "total_upper"], found.total),
+        (["mean_size", "mean_size_lower", "mean_size_upper"], found.mean_size),
+        (
+            ["volume_fraction", "volume_fraction_lower", "volume_fraction_upper"],
+            found.volume_fraction,
+        ),
+    ] {
+        fields.push((names[0], json!(estimate.value)));
+        if let Some(interval) = estimate.interval {
+            fields.push((names[1], json!(interval.lower)));
+            fields.push((names[2], json!(interval.upper)));
+        }
+    }
+    fields.extend([
+        ("profiles", json!(found.profiles)),
+        ("observed", json!(found.observed)),
+        ("refolded", json!(found.refolded)),
+        ("deviance", json!(found.deviance)),
+        ("degrees_of_freedom", json!(found.degrees_of_freedom)),
+        ("condition_number", json!(found.condition_number)),
+        ("penalty", Value::Null),
+        ("method", json!(found.method.name())),
+        ("kernel", json!(kernel)),
+        ("threshold", json!(found.threshold)),
+        ("clamped_bins", json!(found.clamped_bins.len())),
+    ]);
+    fields
 }

@@ -2,11 +2,13 @@
 //!
 //! One file without scripts or links: pictures and plots are inside. It holds nothing that differs between two runs with the same inputs and seed.
 
+mod of_synthesis;
 mod page;
 mod pictures;
 mod plots;
 mod trust;
 
+pub use of_synthesis::{Pictures, report_input};
 pub use page::page;
 pub use trust::{Grade, Verdict, verdict};
 
@@ -155,7 +157,7 @@ pub struct SectionFigures {
     pub area_fraction_photo: f64,
     /// Share of the area inside profiles, sections.
     pub area_fraction_synthetic: f64,
-    /// Distance of the mean colours, encoded, 0 to 1.
+    /// Distance of the colours (Wasserstein-1, mean over channels), encoded, 0 to 1.
     pub colour_distance: f64,
 }
 
@@ -171,20 +173,34 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// Root mean square of log10 of the ratio: 0.3 is a factor of two.
+    /// Root mean square of log10 of the ratio, each fineness weighted by its share of the photograph's variance: 0.3 is a factor of two.
     pub fn log_error(&self) -> f64 {
-        let squares: Vec<f64> = self
-            .photo
-            .iter()
-            .zip(&self.slices)
-            .filter(|(photo, slices)| **photo > 0.0 && **slices > 0.0)
-            .map(|(photo, slices)| (slices / photo).log10().powi(2))
-            .collect();
-        if squares.is_empty() {
-            f64::NAN
-        } else {
-            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        let mut sums = [0.0; 2];
+        for (frequency, photo, ratio) in self.ratios() {
+            // A ring of frequencies holds as many of them as it is long.
+            let weight = frequency * photo;
+            sums[0] += weight * ratio.log10().powi(2);
+            sums[1] += weight;
         }
+        (sums[0] / sums[1]).sqrt()
+    }
+
+    /// The frequency where slices and photograph are farthest apart, and power in slices over that in the photograph there.
+    pub fn worst(&self) -> Option<(f64, f64)> {
+        let by_distance = |ratio: &f64| ratio.log10().abs();
+        self.ratios()
+            .map(|(frequency, _, ratio)| (frequency, ratio))
+            .max_by(|a, b| by_distance(&a.1).total_cmp(&by_distance(&b.1)))
+    }
+
+    /// Frequency, power in the photograph, and power in slices over it, where both have any.
+    fn ratios(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let powers = self.photo.iter().zip(&self.slices);
+        self.frequency
+            .iter()
+            .zip(powers)
+            .filter(|(_, (photo, slices))| **photo > 0.0 && **slices > 0.0)
+            .map(|(&frequency, (&photo, &slices))| (frequency, photo, slices / photo))
     }
 }
 

@@ -175,7 +175,7 @@ fn comparison(html: &mut String, figures: &ComparisonFigures, photo: &PhotoFigur
             html,
             "<tr><td>Area fraction, {name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td></tr>\n\
              <tr><td>Profiles, {name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">sizes: {}</td></tr>\n\
-             <tr><td>Mean colour, {name}</td><td></td><td></td><td class=\"number\">{}</td></tr>",
+             <tr><td>Colours, {name}</td><td></td><td></td><td class=\"number\">{}</td></tr>",
             percent(section.area_fraction_photo),
             percent(section.area_fraction_synthetic),
             percent((section.area_fraction_synthetic / section.area_fraction_photo - 1.0).abs()),
@@ -329,7 +329,7 @@ fn texture(html: &mut String, comparison: &ComparisonFigures) {
     html.push_str("<h2>Texture</h2>\n");
     let _ = writeln!(
         html,
-        "<figure class=\"narrow\">{}<figcaption>Power of the residual (photograph minus mean colours) by fineness. Slices of the residual volume should follow \
+        "<figure class=\"narrow\">{}<figcaption>Power of the residual (photograph minus mean colours) by fineness, away from outlines. Slices of the residual volume should follow \
          the photograph; they are apart by a factor of {} (root mean square).</figcaption></figure>",
         plots::spectra(spectrum),
         significant(10_f64.powf(spectrum.log_error()))

@@ -6,7 +6,6 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::{SizeFigures, Spectrum};
-use crate::numbers::significant;
 
 const SIZE: (u32, u32) = (520, 320);
 const BARS: RGBColor = RGBColor(168, 187, 206);
@@ -25,28 +24,29 @@ pub(super) fn profiles(sizes: &SizeFigures, synthetic: &[f64], unit: &str) -> St
     ];
     drawn(&key, |area| {
         let edges = &sizes.profile_edges;
-        let top = highest(
-            sizes
-                .observed
-                .iter()
-                .map(|n| n + n.sqrt())
-                .chain(sizes.refolded.iter().copied())
-                .chain(synthetic.iter().copied()),
-        );
+        // Per unit of size, so that bins of different widths compare.
+        let each = |counts: &[f64]| -> Vec<f64> {
+            edges
+                .windows(2)
+                .zip(counts)
+                .map(|(bin, n)| n / (bin[1] - bin[0]))
+                .collect()
+        };
+        let error = |sign: f64| each(&sizes.observed.iter().map(|n| n + sign * n.sqrt()).collect::<Vec<_>>());
+        let (observed, refolded, synthetic) = (each(&sizes.observed), each(&sizes.refolded), each(synthetic));
+        let (low, high) = (error(-1.0), error(1.0));
+        let top = highest(high.iter().chain(&refolded).chain(&synthetic).copied());
         let mut chart = axes(
             area,
             span(edges),
             0.0..top,
             &format!("profile size ({unit})"),
-            "profiles",
+            &format!("profiles per {unit} of size"),
         )?;
-        chart.draw_series(bars(edges, &sizes.observed))?;
-        chart.draw_series(whiskers(
-            edges,
-            sizes.observed.iter().map(|n| (n - n.sqrt(), n + n.sqrt())),
-        ))?;
-        chart.draw_series(LineSeries::new(steps(edges, &sizes.refolded), FIT.stroke_width(2)))?;
-        chart.draw_series(LineSeries::new(steps(edges, synthetic), SOLID.stroke_width(2)))?;
+        chart.draw_series(bars(edges, &observed))?;
+        chart.draw_series(whiskers(edges, low.into_iter().zip(high)))?;
+        chart.draw_series(LineSeries::new(steps(edges, &refolded), FIT.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new(steps(edges, &synthetic), SOLID.stroke_width(2)))?;
         Ok(())
     })
 }
@@ -118,7 +118,7 @@ pub(super) fn spectra(spectrum: &Spectrum) -> String {
                 .bold_line_style(INK.mix(0.1))
                 .x_desc("cycles per pixel")
                 .y_desc("power")
-                .x_label_formatter(&|x| significant(*x))
+                .x_label_formatter(&|x| decade(*x))
                 .y_label_formatter(&|y| format!("{y:.0e}"))
                 .axis_style(INK.mix(0.5))
                 .label_style(("sans-serif", 14, &INK))
@@ -184,6 +184,16 @@ fn axes<'a, 'b>(
         .label_style(("sans-serif", 14, &INK))
         .draw()?;
     Ok(chart)
+}
+
+/// 1, 2 and 5 of each decade; the others would overlap.
+fn decade(value: f64) -> String {
+    let leading = value / 10_f64.powf(value.log10().floor());
+    if [1.0, 2.0, 5.0, 10.0].iter().any(|shown| (leading - shown).abs() < 1e-6) {
+        tick(value)
+    } else {
+        String::new()
+    }
 }
 
 fn tick(value: f64) -> String {

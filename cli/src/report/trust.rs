@@ -1,6 +1,6 @@
 //! Whether to trust the result: every check with its figure, what it should be, and what a bad one means.
 
-use super::ReportInput;
+use super::{ReportInput, SizeFigures};
 use crate::numbers::{percent, significant};
 
 /// How a check came out.
@@ -61,6 +61,18 @@ const DOUBTFUL: [&str; 5] = [
 ];
 const GUESSED: [&str; 1] = ["no-binder"];
 
+/// Those of the fit, and one more for each density that would be negative if it could: it no longer serves to fit.
+fn degrees_of_freedom(sizes: &SizeFigures) -> f64 {
+    let largest = sizes.number_density.iter().flatten().copied().fold(0.0, f64::max);
+    let at_zero = sizes
+        .number_density
+        .iter()
+        .flatten()
+        .filter(|density| **density < 1e-3 * largest)
+        .count();
+    sizes.degrees_of_freedom + at_zero as f64
+}
+
 /// Checks the result.
 pub fn verdict(input: &ReportInput) -> Verdict {
     let (photo, sizes, packing, comparison) = (&input.photo, &input.sizes, &input.packing, &input.comparison);
@@ -107,7 +119,7 @@ pub fn verdict(input: &ReportInput) -> Verdict {
             found: format!(
                 "deviance {} for {} degrees of freedom",
                 significant(sizes.deviance),
-                significant(sizes.degrees_of_freedom)
+                degrees_of_freedom(sizes)
             ),
             should_be: "deviance within 3 standard deviations",
             grade: {
@@ -165,13 +177,22 @@ pub fn verdict(input: &ReportInput) -> Verdict {
             meaning: "How far the sizes would have to move, on average, to become the photograph's (Wasserstein-1). If large: too few bins, a wrong shape, or sizes left out.",
         },
         Check {
-            name: "Mean colour of the solid's sections",
+            name: "Colours of the solid's sections",
             found: format!("apart by {} of the range", percent(comparison.exact.colour_distance)),
             should_be: "3 % or less",
             grade: graded(comparison.exact.colour_distance, 0.03, 0.06),
-            meaning: "Averages of the stored colours. If far: colours missing among the categories, or a wrong area fraction.",
+            meaning: "How far the mean colours of profiles and binder would have to move to become the photograph's. If far: colours missing among the categories, or a wrong area fraction.",
         },
     ];
+    if let Some((low, high)) = sizes.total_interval {
+        checks.push(Check {
+            name: "Number of particles",
+            found: format!("{} to {} per cubic {}", significant(low), significant(high), input.unit),
+            should_be: "an interval narrower than half its value",
+            grade: graded((high - low) / sizes.total, 0.5, 1.0),
+            meaning: "How well the counts determine the particles per volume, small ones above all. A wide interval: use fewer bins, a larger --min-size, or photographs of a larger area.",
+        });
+    }
     if let Some(again) = &comparison.resegmented {
         checks.push(Check {
             name: "Sections segmented like the photograph",
@@ -191,10 +212,19 @@ pub fn verdict(input: &ReportInput) -> Verdict {
         let error = spectrum.log_error();
         checks.push(Check {
             name: "Texture of the solid's slices",
-            found: format!("power spectra apart by a factor of {}", significant(10_f64.powf(error))),
+            found: match spectrum.worst() {
+                Some((frequency, ratio)) => format!(
+                    "power apart by a factor of {}; at worst {} times {} at {} cycles per pixel",
+                    significant(10_f64.powf(error)),
+                    significant(ratio.max(1.0 / ratio)),
+                    if ratio < 1.0 { "too little" } else { "too much" },
+                    significant(frequency)
+                ),
+                None => "unknown: there is no residual".to_owned(),
+            },
             should_be: "1.5 or less",
             grade: graded(error, 1.5_f64.log10(), 2.5_f64.log10()),
-            meaning: "Power of the residual texture at each fineness, photograph against slices (root mean square). If far, the texture has forms that this synthesis cannot make.",
+            meaning: "Power of the residual texture by fineness, photograph against sections (root mean square, weighted by power). If far, the texture has forms that this synthesis cannot make, or too little of the photograph lies away from outlines to learn it.",
         });
     }
     let grade = checks.iter().map(|check| check.grade).max().unwrap_or(Grade::Poor);

@@ -5,6 +5,7 @@
 mod bad_input;
 mod contract;
 mod small_commands;
+mod solid;
 
 use std::path::Path;
 

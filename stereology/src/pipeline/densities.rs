@@ -61,6 +61,8 @@ pub struct ParticleDensities {
     pub association: Association,
     /// Where in a bin its particles' sizes lie.
     pub sizes: Sizes,
+    /// Edges of the bins in which `all.observed` and `all.refolded` count profiles.
+    pub profile_edges: Vec<f64>,
 }
 
 /// Profiles that cannot be unfolded.
@@ -162,6 +164,7 @@ pub fn particle_densities(
         by_category,
         association,
         sizes: options.sizes,
+        profile_edges,
     })
 }
 

@@ -3,8 +3,9 @@
 #![allow(clippy::cast_possible_truncation, reason = "pictures are at most 512 pixels wide")]
 
 use image::RgbImage;
-use ndarray::{Array2, ArrayView3};
-use stereology_spectrum::{SpectrumError, periodic_component, radial_spectrum};
+use ndarray::Array2;
+use stereology_segment::Segmentation;
+use stereology_spectrum::{RadialSpectrum, SpectrumError, periodic_component, radial_spectrum};
 use stereology_volume::{Axis, SlicePlane, Solid, SolidError};
 
 /// Power spectra of the residual, over all directions in the plane.
@@ -28,6 +29,12 @@ pub enum SpectraError {
     /// A section that cannot be drawn.
     #[error(transparent)]
     Solid(#[from] SolidError),
+    /// Particles and gaps are too narrow to show a texture.
+    #[error("only {:.1} % of a picture lie away from the outlines of profiles: too little for a spectrum", 100.0 * .share)]
+    AllOutline {
+        /// Share of the picture away from outlines.
+        share: f64,
+    },
 }
 
 const RADIAL_BINS: usize = 32;
@@ -36,23 +43,30 @@ const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 /// Sections are at most so many pixels wide.
 const MOST_PIXELS: f64 = 512.0;
 
-/// Radial power spectra of the photograph's residual (y, x, channel) and of that of three sections of the solid.
+/// Pixels nearer than this to an outline are left out: a photograph blurs outlines, which is no texture.
+const OUTLINE: usize = 3;
+/// Of smaller shares of a picture nothing can be told.
+const LEAST_SHARE: f64 = 0.02;
+
+/// Radial power spectra of the photograph's residual and of that of three sections of the solid, both away from the outlines of profiles.
+///
+/// Left-out pixels count as zero and the power is divided by the share of the others, in photograph and sections alike.
 ///
 /// # Errors
 ///
-/// [`SpectraError`] for pictures too small to have a spectrum.
+/// [`SpectraError`] for pictures too small to have a spectrum, or all outline.
 pub fn residual_spectra(
-    residual: ArrayView3<'_, f32>,
+    segmentation: &Segmentation,
     solid: &Solid,
     pixel: f64,
 ) -> Result<ResidualSpectra, SpectraError> {
-    let (height, width, _) = residual.dim();
-    let photo = Array2::from_shape_fn((height, width), |(y, x)| {
+    let residual = segmentation.residual();
+    let photo = Array2::from_shape_fn(segmentation.labels.dim(), |(y, x)| {
         (0..3)
             .map(|channel| LUMINANCE[channel] * f64::from(residual[[y, x, channel]]))
             .sum::<f64>()
     });
-    let photo = radial_spectrum(periodic_component(photo.view())?.view(), RADIAL_BINS)?;
+    let photo = inner_spectrum(photo, &segmentation.labels)?;
     let plain = solid.without_residual().with_border_samples(1);
     let detailed = solid.clone().with_border_samples(1);
     let mut sections = vec![0.0; RADIAL_BINS];
@@ -64,7 +78,7 @@ pub fn residual_spectra(
             &detailed.slice(&plane, pixels, pixels, pixel)?,
             &plain.slice(&plane, pixels, pixels, pixel)?,
         );
-        let spectrum = radial_spectrum(periodic_component(drawn.view())?.view(), RADIAL_BINS)?;
+        let spectrum = inner_spectrum(drawn, &solid.slice_ids(&plane, pixels, pixels, pixel)?)?;
         for (sum, power) in sections.iter_mut().zip(&spectrum.power) {
             *sum += power / 3.0;
         }
@@ -78,6 +92,55 @@ pub fn residual_spectra(
     })
 }
 
+/// Spectrum of a field away from the outlines of `labels`.
+fn inner_spectrum(mut field: Array2<f64>, labels: &Array2<u32>) -> Result<RadialSpectrum, SpectraError> {
+    let inner = far_from_outlines(labels);
+    let kept = inner.iter().filter(|inner| **inner).count();
+    let share = kept as f64 / inner.len().max(1) as f64;
+    if share < LEAST_SHARE {
+        return Err(SpectraError::AllOutline { share });
+    }
+    let sum: f64 = field
+        .iter()
+        .zip(&inner)
+        .filter(|(_, inner)| **inner)
+        .map(|(value, _)| value)
+        .sum();
+    let mean = sum / kept as f64;
+    field.zip_mut_with(&inner, |value, &inner| *value = if inner { *value - mean } else { 0.0 });
+    let mut spectrum = radial_spectrum(periodic_component(field.view())?.view(), RADIAL_BINS)?;
+    spectrum.power.iter_mut().for_each(|power| *power /= share);
+    Ok(spectrum)
+}
+
+/// Pixels whose neighbours up to [`OUTLINE`] rows and columns away all carry their label.
+fn far_from_outlines(labels: &Array2<u32>) -> Array2<bool> {
+    // Along rows, then along columns: a square is the one after the other.
+    let like_neighbours = |inner: &Array2<bool>, along: Axis2| {
+        Array2::from_shape_fn(labels.dim(), |(y, x)| {
+            let (place, length) = match along {
+                Axis2::Rows => (y, labels.nrows()),
+                Axis2::Columns => (x, labels.ncols()),
+            };
+            (place.saturating_sub(OUTLINE)..(place + OUTLINE + 1).min(length)).all(|other| {
+                let there = match along {
+                    Axis2::Rows => [other, x],
+                    Axis2::Columns => [y, other],
+                };
+                inner[there] && labels[there] == labels[[y, x]]
+            })
+        })
+    };
+    let all = Array2::from_elem(labels.dim(), true);
+    like_neighbours(&like_neighbours(&all, Axis2::Columns), Axis2::Rows)
+}
+
+#[derive(Clone, Copy)]
+enum Axis2 {
+    Rows,
+    Columns,
+}
+
 /// Luminance of `a` less that of `b`, encoded values / 255.
 fn difference(a: &RgbImage, b: &RgbImage) -> Array2<f64> {
     Array2::from_shape_fn((a.height() as usize, a.width() as usize), |(y, x)| {
@@ -86,4 +149,22 @@ fn difference(a: &RgbImage, b: &RgbImage) -> Array2<f64> {
             .map(|channel| LUMINANCE[channel] * (f64::from(p[channel]) - f64::from(q[channel])) / 255.0)
             .sum()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{OUTLINE, far_from_outlines};
+    use ndarray::Array2;
+
+    #[test]
+    fn outlines_are_left_out_on_both_sides() {
+        let labels = Array2::from_shape_fn((30, 40), |(y, x)| u32::from(y >= 10 && x >= 20));
+        let inner = far_from_outlines(&labels);
+        for ((y, x), &inner) in inner.indexed_iter() {
+            let near = |place: usize, edge: usize| place + OUTLINE >= edge && place < edge + OUTLINE;
+            // Near the edge of the marked quarter, which goes on along the lines y = 10 (x >= 20) and x = 20 (y >= 10).
+            let touched = (near(y, 10) && x + OUTLINE >= 20) || (near(x, 20) && y + OUTLINE >= 10);
+            assert_eq!(inner, !touched, "{y} {x}");
+        }
+    }
 }

@@ -1,0 +1,148 @@
+//! From a photograph to a solid, and what can be done with it.
+
+use std::fs;
+
+use crate::{answer, path, stereology, write_discs};
+
+const SMALL: [&str; 10] = [
+    "--count",
+    "150",
+    "--texture-voxels",
+    "32",
+    "--voxels",
+    "24",
+    "--bins",
+    "5",
+    "--iterations",
+    "2",
+];
+
+#[test]
+fn a_small_photograph_becomes_a_solid() {
+    let folder = tempfile::tempdir().unwrap();
+    let (photo, out, again) = (path(&folder, "discs.png"), path(&folder, "out"), path(&folder, "again"));
+    write_discs(&photo);
+    let made = answer(&[&["synthesize", &photo, "-o", &out, "--threads", "1"], &SMALL[..]].concat());
+    for (step, key) in [
+        ("segment", "area_fraction"),
+        ("unfold", "total"),
+        ("pack", "fraction"),
+        ("verification", "size_w1"),
+    ] {
+        assert!(made[step][key].as_f64().unwrap() > 0.0, "{step}: {made}");
+    }
+    assert_eq!(made["pack"]["certified"], true);
+    assert!(made["seconds"]["pack"].as_f64().unwrap() >= 0.0);
+
+    // The same bytes elsewhere, with other threads; and no time, path or thread count in them.
+    let (code, _, error) = stereology(
+        &[
+            &["synthesize", &photo, "-o", &again, "--threads", "2", "--quiet"],
+            &SMALL[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(code, 0, "{error}");
+    let mut names: Vec<String> = fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    for name in &names {
+        let bytes = |folder: &str| fs::read(format!("{folder}/{name}")).unwrap();
+        assert!(bytes(&out) == bytes(&again), "{name} differs");
+        let place = folder.path().to_str().unwrap().as_bytes();
+        assert!(
+            !bytes(&out).windows(place.len()).any(|window| window == place),
+            "{name} holds a path"
+        );
+    }
+    assert_eq!(
+        names,
+        [
+            "binder.png",
+            "comparison.png",
+            "cube.png",
+            "densities.csv",
+            "labels.tif",
+            "means.png",
+            "overlay.png",
+            "packing.json",
+            "profiles.csv",
+            "report.html",
+            "residual.png",
+            "residual.tif",
+            "solid.json",
+            "summary.json",
+            "texture.npy",
+            "volume.npy",
+        ]
+    );
+    let summary: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(format!("{out}/summary.json")).unwrap()).unwrap();
+    assert!(summary.get("seconds").is_none() && summary["pack"] == made["pack"]);
+
+    // Looked at, cut and exported.
+    let cut = answer(&[
+        "slice",
+        &out,
+        "--axis",
+        "y",
+        "--at",
+        "0.3",
+        "--size",
+        "40",
+        "-o",
+        &path(&folder, "y.png"),
+    ]);
+    assert_eq!(cut["width"], 40);
+    answer(&[
+        "slice",
+        &out,
+        "--normal",
+        "1,1,-1",
+        "--offset",
+        "3",
+        "--size",
+        "40",
+        "-o",
+        &path(&folder, "n.png"),
+    ]);
+    answer(&["render", &out, "--size", "48", "-o", &path(&folder, "cube.png")]);
+    let mesh = path(&folder, "tetrahedron.obj");
+    fs::write(
+        &mesh,
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+    )
+    .unwrap();
+    answer(&[
+        "render",
+        &out,
+        "--mesh",
+        &mesh,
+        "--camera",
+        "1,-2,1",
+        "--size",
+        "48",
+        "-o",
+        &path(&folder, "mesh.png"),
+    ]);
+    for (channel, bytes) in [("rgb", 3), ("id", 4), ("category", 1), ("distance", 4)] {
+        for ending in ["npy", "nrrd", "vti", "tif"] {
+            let file = path(&folder, &format!("{channel}.{ending}"));
+            answer(&["export", &out, "--voxels", "16", "--channel", channel, "-o", &file]);
+            assert!(fs::metadata(&file).unwrap().len() >= 16 * 16 * 16 * bytes);
+        }
+    }
+    // volume.npy is what export gives.
+    answer(&["export", &out, "--voxels", "24", "-o", &path(&folder, "volume.npy")]);
+    assert!(fs::read(path(&folder, "volume.npy")).unwrap() == fs::read(format!("{out}/volume.npy")).unwrap());
+
+    // A broken solid is told of, not read.
+    fs::write(format!("{out}/texture.npy"), b"short").unwrap();
+    let (code, _, error) = stereology(&["slice", &out, "-o", &path(&folder, "z.png")]);
+    assert!(
+        code == 1 && error.contains("texture.npy") && !error.contains("panicked"),
+        "{error}"
+    );
+}

@@ -76,6 +76,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Give the binder's colour with --binder R,G,B, or import a label map with --labels FILE.",
     ),
     (
+        "no-texture",
+        "Too few pixels lie inside the particles (or the binder) to learn their texture: they were left plain.",
+        "Use a photograph of higher resolution.",
+    ),
+    (
         "not-converged",
         "The estimate was still changing when the iteration limit was reached.",
         "Use fewer --bins, or --method nnls for comparison.",

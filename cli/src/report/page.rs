@@ -7,7 +7,7 @@ use image::RgbImage;
 use super::{
     ComparisonFigures, Grade, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures, Verdict,
 };
-use super::{pictures, plots, verdict};
+use super::{pictures, plots, trust::degrees_of_freedom, verdict};
 use crate::numbers::{counted, percent, significant};
 use crate::warnings::advice;
 
@@ -277,7 +277,7 @@ fn sizes(html: &mut String, sizes: &SizeFigures, comparison: &ComparisonFigures,
             format!(
                 "{} for {} degrees of freedom",
                 significant(sizes.deviance),
-                significant(sizes.degrees_of_freedom)
+                significant(degrees_of_freedom(sizes))
             ),
         ),
         (

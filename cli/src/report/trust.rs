@@ -62,7 +62,7 @@ const DOUBTFUL: [&str; 5] = [
 const GUESSED: [&str; 1] = ["no-binder"];
 
 /// Those of the fit, and one more for each density that would be negative if it could: it no longer serves to fit.
-fn degrees_of_freedom(sizes: &SizeFigures) -> f64 {
+pub(super) fn degrees_of_freedom(sizes: &SizeFigures) -> f64 {
     let largest = sizes.number_density.iter().flatten().copied().fold(0.0, f64::max);
     let at_zero = sizes
         .number_density

@@ -109,7 +109,7 @@ pub fn particle_densities(
         Some(edges) => edges.clone(),
         None => equal_edges(options.max_size.unwrap_or(largest), options.bins),
     };
-    let threshold = options.unfold.min_size.unwrap_or(profiles.min_size);
+    let threshold = settled_threshold(&edges, options.unfold.min_size.unwrap_or(profiles.min_size));
     let unfolding = UnfoldOptions {
         min_size: (threshold > 0.0).then_some(threshold),
         ..options.unfold
@@ -168,17 +168,31 @@ pub fn particle_densities(
     })
 }
 
-/// The bins profiles are counted in: those of the particles, and an edge at the threshold so that no profile above it is lost. The paper's inverse needs a
-/// square kernel and so goes without that edge.
+/// The bins profiles are counted in: those of the particles cut in halves, so that the fit can be judged, with an edge at the threshold, so that no profile
+/// above it is lost. The paper's inverse needs a square kernel: the particles' own bins.
 fn profile_edges(size_edges: &[f64], threshold: f64, method: Method) -> Vec<f64> {
     let mut edges = size_edges.to_vec();
     let last = edges.last().copied().unwrap_or(0.0);
-    if method != Method::Paper && threshold > 0.0 && threshold < last {
-        edges.push(threshold);
-        edges.sort_by(f64::total_cmp);
-        edges.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * last);
+    if method == Method::Paper {
+        return edges;
     }
+    edges.extend(size_edges.windows(2).map(|bin| 0.5 * (bin[0] + bin[1])));
+    edges.extend((threshold > 0.0 && threshold < last).then_some(threshold));
+    edges.sort_by(f64::total_cmp);
+    edges.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * last);
     edges
+}
+
+/// The threshold, raised to the upper edge of its bin if less than a quarter of that bin lies above it: hardly any profile tells of such particles, and their
+/// density would be anything.
+fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
+    let bin = size_edges
+        .windows(2)
+        .find(|bin| bin[0] < threshold && threshold < bin[1]);
+    match bin {
+        Some(bin) if bin[1] - threshold < 0.25 * (bin[1] - bin[0]) => bin[1],
+        _ => threshold,
+    }
 }
 
 impl ParticleDensities {

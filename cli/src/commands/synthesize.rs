@@ -15,7 +15,7 @@ use stereology::pyramid::TextureReport;
 use stereology::render::{BlockOptions, render_block};
 use stereology::sample;
 use stereology::segment::{read_labels, read_photo};
-use stereology::volume::{Axis, Channel, SlicePlane};
+use stereology::volume::{Channel, SlicePlane};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -85,12 +85,14 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
+/// Size bins if not given: ten leave steps in the profile sizes of the solid's sections.
+const BINS: usize = 16;
 /// Bootstrap replicates if not given: the report shows intervals.
 const REPLICATES: usize = 200;
 /// White between photograph and section in comparison.png, in pixels.
 const GAP: u32 = 8;
-/// Depths of the sections that the report shows, as fractions of the box's side: across z and across x.
-const DEPTHS: [(Axis, f64); 2] = [(Axis::Z, 0.37), (Axis::X, 0.61)];
+/// Normals of the sections that the report shows, and their offsets as fractions of the box's side: aslant, so that the solid's period does not show.
+const SECTIONS: [([f64; 3], f64); 2] = [([1.0, 2.0, 3.0], 0.37), ([-3.0, 2.0, 1.5], 0.61)];
 
 impl Synthesize {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
@@ -137,7 +139,7 @@ impl Synthesize {
             pixel: everywhere.scale,
             segment: self.segment.options(seed),
             densities: DensityOptions {
-                bins: unfold.bins,
+                bins: unfold.bins.unwrap_or(BINS),
                 edges,
                 max_size: unfold.max_size,
                 sizes: unfold.sizes(),
@@ -347,8 +349,8 @@ impl Synthesize {
             .or_fail()?,
             sections: Vec::new(),
         };
-        for (axis, share) in DEPTHS {
-            let plane = SlicePlane::across(axis, share * solid.period().sides()[axis.index()]);
+        for (normal, share) in SECTIONS {
+            let plane = SlicePlane::oblique(normal.into(), share * solid.period().sides().x).or_fail()?;
             pictures
                 .sections
                 .push(solid.slice(&plane, width, height, pixel).or_fail()?);

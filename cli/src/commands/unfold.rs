@@ -52,14 +52,17 @@ pub struct Unfold {
     pub output: Option<PathBuf>,
 }
 
+/// Size bins if not given.
+const BINS: usize = 10;
+
 /// How to unfold.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Unfolding")]
 #[group(id = "unfold-choices")]
 pub struct Choices {
-    /// Number of size bins between 0 and the largest size
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = bins, conflicts_with = "edges")]
-    pub bins: usize,
+    /// Number of size bins between 0 and the largest size [default: 10; 16 for synthesize, whose sections show the steps of coarser bins]
+    #[arg(long, value_name = "N", value_parser = bins, conflicts_with = "edges")]
+    pub bins: Option<usize>,
     /// Edges of the size bins, instead of --bins
     #[arg(long, value_name = "a,b,...")]
     pub edges: Option<Edges>,
@@ -191,19 +194,20 @@ impl Choices {
         let largest = self
             .max_size
             .map_or_else(|| counted().fold(0.0, f64::max), |size| size * scale);
+        let count = self.bins.unwrap_or(BINS);
         match self.spacing {
-            Spacing::Equal => Ok(equal_edges(largest, self.bins)),
+            Spacing::Equal => Ok(equal_edges(largest, count)),
             Spacing::Geometric => {
                 // The first bin is everything up to the smallest size that is seen.
                 let smallest = self
                     .min_size
                     .map_or_else(|| counted().fold(f64::INFINITY, f64::min), |size| size * scale);
-                if self.bins < 2 || smallest.is_nan() || smallest >= largest {
+                if count < 2 || smallest.is_nan() || smallest >= largest {
                     return Err(Failure::usage(
                         "--spacing geometric needs two or more bins, and sizes that differ; give --min-size and --max-size, or --spacing equal",
                     ));
                 }
-                Ok(geometric_edges(smallest, largest, self.bins - 1))
+                Ok(geometric_edges(smallest, largest, count - 1))
             }
         }
     }

@@ -38,10 +38,10 @@ pub struct DensityOptions {
 }
 
 impl Default for DensityOptions {
-    /// Ten bins, sizes spread over them, the default estimator without intervals.
+    /// 16 bins (ten leave steps in the profile sizes of the sections), sizes spread over them, the default estimator without intervals.
     fn default() -> Self {
         Self {
-            bins: 10,
+            bins: 16,
             edges: None,
             max_size: None,
             sizes: Sizes::Integrated,

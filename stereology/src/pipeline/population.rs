@@ -60,6 +60,8 @@ pub enum PopulationFailure {
 
 const ENOUGH_PARTICLES: f64 = 5_000.0;
 const MOST_PARTICLES: f64 = 50_000.0;
+/// A box that holds so many would be left with its few largest particles.
+const HOPELESS: f64 = 1e9;
 /// Beyond this the area fraction and the unfolded volume fraction contradict each other.
 const FRACTION_TOLERANCE: f64 = 0.1;
 
@@ -196,6 +198,13 @@ fn side(
     let side = periods * texture_period;
     if !side.is_finite() || side < 1.5 * largest {
         let why = format!("is less than 1.5 x the largest particle ({largest:.4})");
+        return Err(PopulationFailure::Side { side, why });
+    }
+    let held = per_volume * side.powi(3);
+    if held > HOPELESS {
+        let why = format!(
+            "would hold {held:.2e} particles, of which {MOST_PARTICLES:.0} could be packed: a solid without its fines"
+        );
         return Err(PopulationFailure::Side { side, why });
     }
     if extent != Extent::Auto && (side / asked - 1.0).abs() > 0.02 {

@@ -202,7 +202,7 @@ mod tests {
         };
         assert_eq!(
             (value("--seed"), value("--bins"), value("--box"), value("--threads")),
-            (Some("3"), Some("10"), Some("not given"), None)
+            (Some("3"), Some("not given"), Some("not given"), None)
         );
         assert_eq!(
             of(&["stereology", "synthesize", "-o", "x"]).command,

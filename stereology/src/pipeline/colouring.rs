@@ -1,4 +1,4 @@
-//! Which colour each particle gets: that of a profile drawn from those of its category.
+//! Which colour each particle gets: that of a profile of its category, of about its size.
 
 #![allow(clippy::cast_possible_truncation, reason = "colours are f32 in a solid")]
 
@@ -6,38 +6,43 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_anneal::Packing;
 use stereology_segment::Profile;
+use stereology_shape::Particle;
 
-/// The mean colour of a randomly chosen profile for each particle, from the profiles of its category: section 4.2.
+/// The mean colour of a randomly chosen profile for each particle, drawn from those of its category that are nearest to it in size: section 4.2.
 ///
-/// Profiles outside the counting frame have colours too and are drawn as well. A category without profiles takes from all.
+/// The paper draws from all of a category. Where colours inside a category still differ by size (black dust and teal slabs that are both dark), that paints
+/// the few large particles in the colours of the many small ones; a fifth of the category, at least a dozen, is drawn from instead. `pixel` is the size of a
+/// pixel in the packing's unit of length. Profiles outside the counting frame have colours too and are drawn as well; a category without profiles takes from
+/// all.
 #[must_use]
-pub fn particle_colours(packing: &Packing, profiles: &[Profile], seed: u64) -> Vec<[f32; 3]> {
-    let colour = |profile: &Profile| profile.colour.map(|c| c as f32);
-    let all: Vec<[f32; 3]> = profiles.iter().map(colour).collect();
-    let of_category: Vec<Vec<[f32; 3]>> = (0..=u8::MAX)
-        .map(|category| {
-            profiles
-                .iter()
-                .filter(|profile| profile.category == category)
-                .map(colour)
-                .collect()
-        })
+pub fn particle_colours(packing: &Packing, profiles: &[Profile], pixel: f64, seed: u64) -> Vec<[f32; 3]> {
+    let by_size = |chosen: &dyn Fn(&Profile) -> bool| -> Vec<&Profile> {
+        let mut of: Vec<&Profile> = profiles.iter().filter(|profile| chosen(profile)).collect();
+        of.sort_by(|a, b| a.size.total_cmp(&b.size).then(a.id.cmp(&b.id)));
+        of
+    };
+    let all = by_size(&|_| true);
+    let of_category: Vec<Vec<&Profile>> = (0..=u8::MAX)
+        .map(|category| by_size(&|profile| profile.category == category))
         .collect();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(COLOURS);
-    let mut draw = |category: u8| {
-        let own = &of_category[usize::from(category)];
+    let mut draw = |particle: &Particle| {
+        let own = &of_category[usize::from(particle.category)];
         let from = if own.is_empty() { &all } else { own };
-        from.get(rng.random_range(0..from.len().max(1)))
-            .copied()
-            .unwrap_or([0.5; 3])
+        let few = (from.len() / 5).max(FEWEST).min(from.len());
+        let middle = from.partition_point(|profile| profile.size * pixel < TYPICAL_PROFILE * particle.size);
+        let first = middle.saturating_sub(few / 2).min(from.len() - few);
+        let drawn = from.get(first + rng.random_range(0..few.max(1)));
+        drawn.map_or([0.5; 3], |profile| profile.colour.map(|c| c as f32))
     };
-    packing
-        .particles()
-        .iter()
-        .map(|particle| draw(particle.category))
-        .collect()
+    packing.particles().iter().map(&mut draw).collect()
 }
+
+/// Fewest profiles that a colour is drawn from, if there are so many.
+const FEWEST: usize = 12;
+/// A profile is this large on the average over the sections of a particle of size 1: π / 4 for spheres.
+const TYPICAL_PROFILE: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Random streams of the pipeline, apart from those of the rooms.
 const COLOURS: u64 = 1 << 40;

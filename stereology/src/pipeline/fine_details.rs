@@ -38,8 +38,22 @@ pub fn fine_details(
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<FineDetails, TextureError> {
     let inner = far_from(&borders(&segmentation.labels), BORDER);
-    let no_fines = far_from(&missed_fines(segmentation), BORDER);
     let labels = &segmentation.labels;
+    let fines = missed_fines(segmentation);
+    let count = |of: &dyn Fn(&u32, &bool) -> bool| {
+        labels
+            .iter()
+            .zip(&fines)
+            .filter(|(label, fine)| of(label, fine))
+            .count() as f64
+    };
+    // If more than a few pixels look like fines, binder and particles share their colours, and these pixels are the binder's own.
+    let few_fines = count(&|_, fine| *fine) < MOST_FINES * count(&|label, _| *label == 0);
+    let no_fines = if few_fines {
+        far_from(&fines, BORDER)
+    } else {
+        Array2::from_elem(labels.dim(), true)
+    };
     let binder_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] == 0 && inner[p] && no_fines[p]);
     let particle_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] > 0 && inner[p]);
     let mut warnings = Vec::new();
@@ -75,6 +89,8 @@ pub fn fine_details(
     })
 }
 
+/// Largest share of the binder's pixels that missed fines can be.
+const MOST_FINES: f64 = 0.05;
 /// How many pixels from a border blur reaches.
 const BORDER: usize = 2;
 

@@ -213,7 +213,7 @@ pub fn synthesize(
     let solid = Solid::new(
         bodies,
         packing.particles().to_vec(),
-        particle_colours(&packing, &segmentation.profiles, options.seed),
+        particle_colours(&packing, &segmentation.profiles, options.pixel, options.seed),
         population.period,
         segmentation.binder.colour.map(|c| c as f32),
         Some(details.residual.clone()),

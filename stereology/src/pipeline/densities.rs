@@ -183,14 +183,14 @@ fn profile_edges(size_edges: &[f64], threshold: f64, method: Method) -> Vec<f64>
     edges
 }
 
-/// The threshold, raised to the upper edge of its bin if less than a quarter of that bin lies above it: hardly any profile tells of such particles, and their
+/// The threshold, raised to the upper edge of its bin if less than half of that bin lies above it: hardly any profile tells of such particles, and their
 /// density would be anything.
 fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
     let bin = size_edges
         .windows(2)
         .find(|bin| bin[0] < threshold && threshold < bin[1]);
     match bin {
-        Some(bin) if bin[1] - threshold < 0.25 * (bin[1] - bin[0]) => bin[1],
+        Some(bin) if bin[1] - threshold < 0.5 * (bin[1] - bin[0]) => bin[1],
         _ => threshold,
     }
 }

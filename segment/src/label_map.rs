@@ -15,6 +15,9 @@ use tiff::{
 
 use crate::{error::SegmentError, photo::read_bytes};
 
+/// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
+const LARGEST_MAP: usize = 1_600_000_000;
+
 /// Reads a label map, axes (y, x): TIFF of u8, u16, u32 or i32, or PNG of u8 or u16, as ImageGrains, StarDist, Cellpose and ImageJ write them. 0 is the binder.
 ///
 /// # Errors
@@ -80,9 +83,10 @@ fn read_tiff(path: &Path, bytes: &[u8]) -> Result<Array2<u32>, SegmentError> {
         path: path.into(),
         reason: e.to_string(),
     };
-    let mut decoder = Decoder::new(Cursor::new(bytes))
-        .map_err(refuse)?
-        .with_limits(Limits::unlimited());
+    // A header may claim any size; no map of ours is larger than this.
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = LARGEST_MAP;
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(refuse)?.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(refuse)?;
     let samples: Vec<u32> = match decoder.read_image().map_err(refuse)? {
         DecodingResult::U8(v) => v.into_iter().map(u32::from).collect(),

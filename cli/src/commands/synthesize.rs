@@ -85,6 +85,8 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
+/// More voxels along a side would take longer than the whole solid: a matter for `export`.
+const MOST_VOXELS: usize = 2048;
 /// Size bins if not given: ten leave steps in the profile sizes of the solid's sections.
 const BINS: usize = 16;
 /// Bootstrap replicates if not given: the report shows intervals.
@@ -97,6 +99,13 @@ const SECTIONS: [([f64; 3], f64); 2] = [([1.0, 2.0, 3.0], 0.37), ([-3.0, 2.0, 1.
 impl Synthesize {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = self.options(everywhere)?;
+        if self.solid.voxels > MOST_VOXELS {
+            return Err(Failure::run(format!(
+                "--voxels {}: volume.npy would need {:.1e} bytes; ask for at most {MOST_VOXELS}, or export a finished solid",
+                self.solid.voxels,
+                3.0 * (self.solid.voxels as f64).powi(3)
+            )));
+        }
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
         let (photo, name) = self.photo()?;
         let types = self.types()?;

@@ -119,3 +119,21 @@ fn written_and_read() {
     };
     assert_eq!(samples, found.residual().into_raw_vec_and_offset().0);
 }
+
+/// A header that claims 10¹² pixels is refused before memory is asked for.
+#[test]
+fn lying_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("labels.tif");
+    write_labels(&file, Array2::from_elem((16, 16), 1).view()).unwrap();
+    let mut bytes = std::fs::read(&file).unwrap();
+    for tag in [256_u16, 257] {
+        // Width and height: tag, type LONG, one value.
+        let entry = [&tag.to_le_bytes()[..], &[4, 0, 1, 0, 0, 0]].concat();
+        let place = bytes.windows(8).position(|window| window == entry).unwrap() + 8;
+        bytes[place..place + 4].copy_from_slice(&1_000_000_u32.to_le_bytes());
+    }
+    std::fs::write(&file, bytes).unwrap();
+    let refused = read_labels(&file).unwrap_err().to_string();
+    assert!(refused.contains("labels.tif"), "{refused}");
+}

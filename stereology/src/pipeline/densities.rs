@@ -183,17 +183,20 @@ fn profile_edges(size_edges: &[f64], threshold: f64, method: Method) -> Vec<f64>
     edges
 }
 
-/// The threshold, raised to the upper edge of its bin if less than half of that bin lies above it: hardly any profile tells of such particles, and their
-/// density would be anything.
+/// The threshold, raised to the upper edge of its bin if that edge is less than [`SEEN`] times the threshold: a plane that cuts a sphere of diameter D shows it
+/// above t with probability √(1 − (t / D)²), and where that is small hardly any profile tells of such particles and their density would be anything.
 fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
     let bin = size_edges
         .windows(2)
         .find(|bin| bin[0] < threshold && threshold < bin[1]);
     match bin {
-        Some(bin) if bin[1] - threshold < 0.5 * (bin[1] - bin[0]) => bin[1],
+        Some(bin) if bin[1] < SEEN * threshold => bin[1],
         _ => threshold,
     }
 }
+
+/// At this many thresholds three quarters of a sphere's profiles are seen.
+const SEEN: f64 = 1.5;
 
 impl ParticleDensities {
     /// Number density of a size bin, the categories added up; `None` below the threshold.

@@ -93,6 +93,21 @@ pub enum DensityError {
 /// # Errors
 ///
 /// [`DensityError`]: nothing to count, sizes beyond the largest, bad bins, a cancelled run.
+///
+/// # Examples
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+///
+/// // Cuts through spheres of diameter 10, at evenly spread depths: N_A = D N_V.
+/// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, min_size: 0.0, sizes };
+/// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
+/// let found = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
+/// assert!((found.all.total.value / (300.0 / 1e5 / 10.0) - 1.0).abs() < 0.15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn particle_densities(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,

@@ -96,6 +96,21 @@ impl FileError {
 
 impl PackingFile {
     /// The particles of a packing; `shapes` names each shape.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology::files::PackingFile;
+    /// use stereology::shape::{Particle, PeriodicBox};
+    ///
+    /// let particle = Particle { shape: 0, size: 1.0, category: 0, position: nalgebra::Point3::origin(), orientation: nalgebra::UnitQuaternion::identity() };
+    /// let file = PackingFile::new(vec!["sphere".to_owned()], &[particle], &PeriodicBox::new(nalgebra::Vector3::repeat(4.0))?);
+    /// let folder = tempfile::tempdir()?;
+    /// file.write(folder.path().join("packing.json"))?;
+    /// let (particles, period) = PackingFile::read(folder.path().join("packing.json"))?.unpack()?;
+    /// assert_eq!((particles, period.volume()), (vec![particle], 64.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn new(shapes: Vec<String>, particles: &[Particle], period: &PeriodicBox) -> Self {
         let packed = |particle: &Particle| {
@@ -204,6 +219,29 @@ const SOLID_SCHEMA: &str = "stereology.solid/1";
 /// # Errors
 ///
 /// [`FileError`] if a file cannot be written.
+///
+/// # Examples
+///
+/// ```
+/// use stereology::files::{open_solid, save_solid};
+/// use nalgebra::{Point3, UnitQuaternion, Vector3};
+/// use stereology::pipeline::ParticleTypes;
+/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::volume::{Residual, Solid};
+///
+/// // A sphere of diameter 40 in a box of side 64.
+/// let spheres = ParticleTypes::parse(&["sphere"])?;
+/// let particle = Particle { shape: 0, size: 40.0, category: 0, position: Point3::new(32.0, 32.0, 32.0), orientation: UnitQuaternion::identity() };
+/// let period = PeriodicBox::new(Vector3::repeat(64.0))?;
+/// let residual = Residual { binder: ndarray::Array4::zeros([8, 8, 8, 3]), particles: ndarray::Array4::zeros([8, 8, 8, 3]), voxel: 8.0 };
+/// let solid = Solid::new(spheres.unit_bodies(), vec![particle], vec![[0.7, 0.3, 0.2]], period, [0.8; 3], Some(residual.clone()))?;
+/// let folder = tempfile::tempdir()?;
+/// save_solid(folder.path(), &solid, &residual, &spheres)?;
+/// let opened = open_solid(folder.path())?;
+/// assert_eq!(opened.solid.particles(), solid.particles());
+/// assert_eq!(opened.shapes, ["sphere"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn save_solid(
     folder: impl AsRef<Path>,
     solid: &Solid,
@@ -329,6 +367,24 @@ fn read_texture(path: &Path, voxel: f64) -> Result<Residual, FileError> {
 /// # Errors
 ///
 /// [`FileError`] if it cannot be written.
+///
+/// # Examples
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::files::write_densities;
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+///
+/// let profiles = MeasuredProfiles { sizes: vec![3.0, 4.0, 5.0], weights: vec![1.0; 3], categories: vec![0; 3], area: 100.0, min_size: 0.0 };
+/// let options = DensityOptions { bins: 2, ..DensityOptions::default() };
+/// let densities = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
+/// let folder = tempfile::tempdir()?;
+/// write_densities(folder.path().join("densities.csv"), &densities)?;
+/// let table = std::fs::read_to_string(folder.path().join("densities.csv"))?;
+/// assert_eq!(table.lines().count(), 1 + 2);
+/// assert!(table.lines().nth(2).is_some_and(|row| row.starts_with("2.5,5,")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_densities(path: impl AsRef<Path>, densities: &ParticleDensities) -> Result<(), FileError> {
     let mut rows = DensityRows::default();
     rows.unfolding(&densities.all, None, None);
@@ -341,6 +397,19 @@ pub fn write_densities(path: impl AsRef<Path>, densities: &ParticleDensities) ->
 }
 
 /// Rows of `densities.csv`, gathered and then written.
+///
+/// # Examples
+///
+/// ```
+/// use stereology::files::DensityRows;
+///
+/// let mut rows = DensityRows::default();
+/// rows.densities(&[0.0, 1.0, 2.0], &[None, Some(0.25)], Some(0), None); // nothing is known of the first bin
+/// let folder = tempfile::tempdir()?;
+/// rows.write(folder.path().join("densities.csv"))?;
+/// assert!(std::fs::read_to_string(folder.path().join("densities.csv"))?.ends_with("0,1,,,,0,\n1,2,0.25,,,0,\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct DensityRows {
     lines: Vec<String>,

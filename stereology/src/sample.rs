@@ -8,6 +8,13 @@ use serde::Deserialize;
 /// # Errors
 ///
 /// None in practice: the picture is part of the program.
+///
+/// # Examples
+///
+/// ```
+/// assert_eq!(stereology::sample::photo()?.dimensions(), (912, 672));
+/// # Ok::<(), image::ImageError>(())
+/// ```
 pub fn photo() -> Result<RgbImage, ImageError> {
     Ok(image::load_from_memory_with_format(PHOTO, ImageFormat::Png)?.into_rgb8())
 }
@@ -17,6 +24,14 @@ pub fn photo() -> Result<RgbImage, ImageError> {
 /// # Errors
 ///
 /// None in practice: the file is part of the program.
+///
+/// # Examples
+///
+/// ```
+/// let truth = stereology::sample::truth()?;
+/// assert!((truth.shapes.iter().map(|of| of.share).sum::<f64>() - 1.0).abs() < 1e-12);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 pub fn truth() -> Result<Truth, serde_json::Error> {
     serde_json::from_slice(TRUTH)
 }

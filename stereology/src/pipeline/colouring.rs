@@ -14,6 +14,30 @@ use stereology_shape::Particle;
 /// the few large particles in the colours of the many small ones; a fifth of the category, at least a dozen, is drawn from instead. `pixel` is the size of a
 /// pixel in the packing's unit of length. Profiles outside the counting frame have colours too and are drawn as well; a category without profiles takes from
 /// all.
+///
+/// # Examples
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use nalgebra::{Point3, UnitQuaternion, Vector3};
+/// use ndarray::Array2;
+/// use stereology::anneal::Packing;
+/// use stereology::pipeline::{ParticleTypes, particle_colours};
+/// use stereology::segment::{SegmentOptions, Segmentation};
+/// use stereology::shape::{Particle, PeriodicBox};
+///
+/// // One brick profile; every particle becomes brick.
+/// let brick = |x: usize, y: usize| (20..60).contains(&x) && (30..50).contains(&y);
+/// let photo = RgbImage::from_fn(80, 80, |x, y| Rgb(if brick(x as usize, y as usize) { [170, 70, 50] } else { [225, 220, 210] }));
+/// let labels = Array2::from_shape_fn((80, 80), |(y, x)| u32::from(brick(x, y)));
+/// let found = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?;
+/// let particle = Particle { shape: 0, size: 4.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
+/// let spheres = ParticleTypes::parse(&["sphere"])?.unit_bodies();
+/// let packing = Packing::verify(&spheres, vec![particle], &PeriodicBox::new(Vector3::repeat(10.0))?)?;
+/// let red = particle_colours(&packing, &found.profiles, 1.0, 0)[0][0];
+/// assert!((red - 170.0 / 255.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn particle_colours(packing: &Packing, profiles: &[Profile], pixel: f64, seed: u64) -> Vec<[f32; 3]> {
     let by_size = |chosen: &dyn Fn(&Profile) -> bool| -> Vec<&Profile> {

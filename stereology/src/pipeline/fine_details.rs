@@ -29,6 +29,28 @@ pub struct FineDetails {
 /// # Errors
 ///
 /// [`TextureError`]: a volume too small or beyond memory, or a cancelled run.
+///
+/// # Examples
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use ndarray::Array2;
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::fine_details;
+/// use stereology::pyramid::TextureOptions;
+/// use stereology::segment::{SegmentOptions, Segmentation};
+///
+/// // A plain brick square in a speckled binder.
+/// let brick = |x: usize, y: usize| (20..70).contains(&x) && (20..70).contains(&y);
+/// let speck = |x: u32, y: u32| ((x * 7919 + y * 104_729) % 64) as u8;
+/// let photo = RgbImage::from_fn(96, 96, |x, y| Rgb(if brick(x as usize, y as usize) { [120, 50, 30] } else { [180 + speck(x, y); 3] }));
+/// let labels = Array2::from_shape_fn((96, 96), |(y, x)| u32::from(brick(x, y)));
+/// let found = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?;
+/// let details = fine_details(&found, &found.residual(), 16, 1.0, &TextureOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// let spread = |field: &ndarray::Array4<f32>| field.iter().map(|v| v * v).sum::<f32>() / field.len() as f32;
+/// assert!(spread(&details.residual.binder) > 100.0 * spread(&details.residual.particles));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fine_details(
     segmentation: &Segmentation,
     residual: &ndarray::Array3<f32>,

@@ -137,6 +137,20 @@ impl ParticleTypes {
     /// # Errors
     ///
     /// [`ParticleTypesError::Edges`] for edges that make no bins.
+    ///
+    /// # Examples
+    ///
+    /// One bin: eq. (1), N_A = H N_V, with H the mean of the two types' calipers.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes};
+    ///
+    /// let both = ParticleTypes::parse(&["sphere", "ellipsoid:1,1,2"])?;
+    /// let mean: f64 = both.types().iter().map(|of| 0.5 * of.body.mean_width() / of.body.size()).sum();
+    /// let kernel = both.kernel(&[0.0, 3.0], &[0.0, 3.0], Sizes::UpperEdge)?;
+    /// assert!((kernel.matrix()[(0, 0)] - 3.0 * mean).abs() < 1e-9);
+    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
+    /// ```
     pub fn kernel(
         &self,
         profile_edges: &[f64],
@@ -159,6 +173,19 @@ impl ParticleType {
     /// # Errors
     ///
     /// [`ParticleTypesError::Edges`] for edges that make no bins.
+    ///
+    /// # Examples
+    ///
+    /// A sphere of diameter 2 shows a profile below diameter 1 with probability 1 - √3/2, and has a caliper of 2: eqs. (2), (3).
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes};
+    ///
+    /// let spheres = ParticleTypes::parse(&["sphere"])?;
+    /// let kernel = spheres.types()[0].kernel(&[0.0, 1.0, 2.0], &[0.0, 1.0, 2.0], Sizes::UpperEdge)?;
+    /// assert!((kernel.matrix()[(0, 1)] - 2.0 * (1.0 - 0.75_f64.sqrt())).abs() < 1e-12);
+    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
+    /// ```
     pub fn kernel(
         &self,
         profile_edges: &[f64],

@@ -73,6 +73,24 @@ const FRACTION_TOLERANCE: f64 = 0.1;
 /// # Errors
 ///
 /// [`PopulationFailure`].
+///
+/// # Examples
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
+///
+/// // Cuts through spheres of diameter 10, at evenly spread depths, on an area of 1e5: they fill 300 / 1e5 / 10 * pi 10³ / 6 = .157.
+/// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, min_size: 0.0, sizes };
+/// let spheres = ParticleTypes::parse(&["sphere"])?;
+/// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
+/// let densities = particle_densities(&profiles, &spheres, &options, &|_| ControlFlow::Continue(()))?;
+/// let drawn = population(&densities, &spheres, 0.157, Extent::Count(1000), 8.0, 0)?;
+/// let volume: f64 = drawn.grains.iter().map(|grain| grain.size.powi(3) * std::f64::consts::PI / 6.0).sum();
+/// assert!((volume / drawn.period.volume() - 0.157).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn population(
     densities: &ParticleDensities,
     types: &ParticleTypes,

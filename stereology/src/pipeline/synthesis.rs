@@ -162,6 +162,26 @@ impl SynthesisError {
 ///
 /// [`SynthesisError`]: the step that failed, and why.
 ///
+/// # Examples
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use ndarray::Array2;
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::{Extent, ParticleTypes, SynthesisOptions, synthesize};
+///
+/// // A picture of 25 brick discs in a pale binder.
+/// let disc = |x: u32, y: u32| (x % 40).abs_diff(20).pow(2) + (y % 40).abs_diff(20).pow(2) < (6 + (x / 40 + y / 40)).pow(2);
+/// let photo = RgbImage::from_fn(200, 200, |x, y| if disc(x, y) { Rgb([170, 70, 50]) } else { Rgb([225, 220, 210]) });
+/// let labels = Array2::from_shape_fn((200, 200), |(y, x)| if disc(x as u32, y as u32) { (1 + x / 40 + 5 * (y / 40)) as u32 } else { 0 });
+/// // Without the label map the profiles are segmented.
+/// let options = SynthesisOptions { extent: Extent::Count(300), texture_voxels: 16, ..SynthesisOptions::default() };
+/// let made = synthesize(&photo, Some(labels), &ParticleTypes::parse(&["sphere"])?, &options, &|_, _| ControlFlow::Continue(()))?;
+/// let sections = made.verification.exact;
+/// assert!((sections.area_fraction_synthetic / sections.area_fraction_photo - 1.0).abs() < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # References
 ///
 /// Jagnow, Dorsey & Rushmeier 2004, sections 3 and 4.
@@ -243,6 +263,23 @@ pub fn synthesize(
 }
 
 /// The profiles of a segmentation in the unit of length, ready to be unfolded.
+///
+/// # Examples
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use ndarray::Array2;
+/// use stereology::pipeline::measured_profiles;
+/// use stereology::segment::{SegmentOptions, Segmentation};
+///
+/// // A disc of diameter 40 pixels, on a picture of .1 mm a pixel.
+/// let disc = |x: usize, y: usize| x.abs_diff(50).pow(2) + y.abs_diff(50).pow(2) <= 20 * 20;
+/// let photo = RgbImage::from_fn(100, 100, |x, y| Rgb(if disc(x as usize, y as usize) { [170, 70, 50] } else { [225, 220, 210] }));
+/// let labels = Array2::from_shape_fn((100, 100), |(y, x)| u32::from(disc(x, y)));
+/// let found = measured_profiles(&Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?, 0.1);
+/// assert!((found.sizes[0] - 4.0).abs() < 0.05);
+/// # Ok::<(), stereology::segment::SegmentError>(())
+/// ```
 #[must_use]
 pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredProfiles {
     let profiles = &segmentation.profiles;

@@ -81,6 +81,35 @@ pub enum Recipe<'a> {
 /// # Errors
 ///
 /// [`VerificationError`].
+///
+/// # Examples
+///
+/// The photograph is a cut through the middle of the only sphere; cuts at all depths show less of it.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::{Recipe, measured_profiles, verify};
+/// use stereology::segment::{SegmentOptions, Segmentation};
+/// use nalgebra::{Point3, UnitQuaternion, Vector3};
+/// use stereology::pipeline::ParticleTypes;
+/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::volume::{Axis, SlicePlane, Solid};
+///
+/// // A sphere of diameter 40 in a box of side 64.
+/// let spheres = ParticleTypes::parse(&["sphere"])?;
+/// let particle = Particle { shape: 0, size: 40.0, category: 0, position: Point3::new(32.0, 32.0, 32.0), orientation: UnitQuaternion::identity() };
+/// let period = PeriodicBox::new(Vector3::repeat(64.0))?;
+/// let solid = Solid::new(spheres.unit_bodies(), vec![particle], vec![[0.7, 0.3, 0.2]], period, [0.9; 3], None)?;
+/// let middle = SlicePlane::across(Axis::Z, 32.0);
+/// let options = SegmentOptions::default();
+/// let photo = Segmentation::from_labels(&solid.slice(&middle, 64, 64, 1.0)?, solid.slice_ids(&middle, 64, 64, 1.0)?, &options)?;
+/// let sizes = measured_profiles(&photo, 1.0);
+/// let sections = verify(&solid, &photo, &sizes, Recipe::Labelled(&options), 1.0, &|_| ControlFlow::Continue(()))?.exact;
+/// let sphere = std::f64::consts::PI / 6.0 * (40.0_f64 / 64.0).powi(3);
+/// assert!((sections.area_fraction_synthetic / sphere - 1.0).abs() < 0.01);
+/// assert!(sections.area_fraction_photo > 2.0 * sphere);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn verify(
     solid: &Solid,
     photo: &Segmentation,

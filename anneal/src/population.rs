@@ -163,6 +163,18 @@ pub fn mix(sizes: &[f64], shares: &[f64], seed: u64) -> Result<Vec<Grain>, Popul
 /// # Errors
 ///
 /// [`PopulationError::Nothing`] if it is zero or a shape does not exist.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_anneal::{Grain, total_volume};
+/// use stereology_shape::{Body, UnitBody};
+///
+/// let spheres = [UnitBody::new(&Body::sphere(1.0)?)];
+/// let grains = [1.0, 2.0].map(|size| Grain { shape: 0, size, category: 0 });
+/// assert!((total_volume(&spheres, &grains)? - 9.0 * std::f64::consts::PI / 6.0).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn total_volume(bodies: &[UnitBody], grains: &[Grain]) -> Result<f64, PopulationError> {
     let mut volume = 0.0;
     for grain in grains {
@@ -230,6 +242,19 @@ pub fn scale_to_fraction(
 /// # Errors
 ///
 /// As [`box_for_fraction`], and [`PopulationError::TooMany`] above 10⁸.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_anneal::{Grain, count_to_fill};
+/// use stereology_shape::{Body, PeriodicBox, UnitBody};
+///
+/// let spheres = [UnitBody::new(&Body::sphere(1.0)?)];
+/// let grain = Grain { shape: 0, size: 1.0, category: 0 };
+/// let period = PeriodicBox::new(nalgebra::Vector3::repeat(10.0))?;
+/// assert_eq!(count_to_fill(&spheres, &[grain], &period, 0.3)?, 573); // 300 / (pi / 6)
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn count_to_fill(
     bodies: &[UnitBody],
     sample: &[Grain],

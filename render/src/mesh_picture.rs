@@ -141,6 +141,18 @@ pub fn render_mesh(
 /// # Errors
 ///
 /// As [`render_mesh`], and [`RenderError::Cancelled`].
+///
+/// # Examples
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology_render::{Camera, RenderError, RenderOptions, render_mesh_with_progress};
+/// use stereology_shape::TriangleMesh;
+///
+/// let torus = TriangleMesh::torus(2.0, 0.8, 48, 24);
+/// let broken_off = render_mesh_with_progress(&torus, &|_| [0.5; 3], &Camera::default(), &RenderOptions::default(), &|_| ControlFlow::Break(()));
+/// assert!(matches!(broken_off, Err(RenderError::Cancelled)));
+/// ```
 pub fn render_mesh_with_progress(
     mesh: &TriangleMesh,
     colour: Colour<'_>,

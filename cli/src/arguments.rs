@@ -117,7 +117,7 @@ impl Invocation {
                 })
                 .collect();
             let shown = if values.is_empty() {
-                "not given".to_owned()
+                told_default(arg).unwrap_or_else(|| "not given".to_owned())
             } else {
                 values.join("  ")
             };
@@ -147,6 +147,13 @@ impl Invocation {
         invocation.command = format!("stereology {name}{files}{output}{options}");
         invocation
     }
+}
+
+/// What the help of an argument tells of its default.
+fn told_default(arg: &clap::Arg) -> Option<String> {
+    let help = arg.get_help()?.to_string();
+    let (_, told) = help.split_once("[default: ")?;
+    Some(format!("not given: {}", told.strip_suffix(']')?))
 }
 
 /// A word as a shell reads it back.
@@ -201,8 +208,18 @@ mod tests {
                 .map(|(_, value)| value.as_str())
         };
         assert_eq!(
-            (value("--seed"), value("--bins"), value("--box"), value("--threads")),
-            (Some("3"), Some("not given"), Some("not given"), None)
+            (
+                value("--seed"),
+                value("--count"),
+                value("--fraction"),
+                value("--threads")
+            ),
+            (
+                Some("3"),
+                Some("not given"),
+                Some("not given: the photograph's area fraction"),
+                None
+            )
         );
         assert_eq!(
             of(&["stereology", "synthesize", "-o", "x"]).command,

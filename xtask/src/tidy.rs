@@ -78,7 +78,7 @@ pub fn run() -> Result<()> {
             "tree",
             "--workspace",
             "--edges",
-            "normal,build",
+            "normal,build,dev",
             "--prefix",
             "none",
             "--offline",

@@ -1,5 +1,8 @@
 //! What a reader of the result should know: the symptoms of the paper's section 5.2 and of the fit, as data.
 
+use crate::estimator::Fit;
+use crate::problem::Problem;
+use crate::{Kernel, Method, ProfileCounts, UnfoldOptions};
 use std::fmt;
 
 /// A warning about a result. [`Finding::code`] is fixed for scripts; `Display` is for people.
@@ -12,6 +15,8 @@ pub enum Finding {
         bins: Vec<usize>,
         /// The sum of what was cut off, over the sum of what stayed.
         share: f64,
+        /// The largest number of equal bins without a negative density, if it was looked for ([`with_cure`](Self::with_cure)).
+        enough: Option<usize>,
     },
     /// Some bins hold fewer than five profiles, but not none (`few-profiles-in-bin`).
     FewProfilesInBin {
@@ -26,6 +31,8 @@ pub enum Finding {
         from: usize,
         /// Last bin of the run.
         to: usize,
+        /// The largest number of equal bins without such a run, if it was looked for ([`with_cure`](Self::with_cure)).
+        enough: Option<usize>,
     },
     /// The threshold is no profile edge; the bin it falls in was left out too (`threshold-moved`).
     ThresholdMoved {
@@ -46,7 +53,7 @@ impl Finding {
     ///
     /// ```
     /// use stereology_unfold::Finding;
-    /// assert_eq!(Finding::NegativeBins { bins: vec![0], share: 0.01 }.code(), "negative-bins");
+    /// assert_eq!(Finding::NegativeBins { bins: vec![0], share: 0.01, enough: None }.code(), "negative-bins");
     /// ```
     #[must_use]
     pub fn code(&self) -> &'static str {
@@ -58,29 +65,51 @@ impl Finding {
             Self::NotConverged { .. } => "not-converged",
         }
     }
+
+    /// The finding with the number of equal bins that cures it: the largest below `bins` at which `unfold_again`, which unfolds the same profiles in
+    /// so many bins, does not come to the same finding. Findings that bins do not cure, or that name the number already, stay as they are.
+    ///
+    /// ```
+    /// use stereology_unfold::Finding;
+    /// let found = Finding::NegativeBins { bins: vec![0], share: 0.01, enough: None };
+    /// let cured = found.with_cure(10, &|bins| if bins > 6 { vec![found.clone()] } else { Vec::new() });
+    /// assert!(cured.to_string().contains("6 equal bins"));
+    /// ```
+    #[must_use]
+    pub fn with_cure(&self, bins: usize, unfold_again: &dyn Fn(usize) -> Vec<Self>) -> Self {
+        let mut cured = self.clone();
+        if let Self::NegativeBins { enough, .. } | Self::OscillatingBins { enough, .. } = &mut cured {
+            *enough = (1..bins)
+                .rev()
+                .find(|&fewer| unfold_again(fewer).iter().all(|finding| finding.code() != self.code()));
+        }
+        cured
+    }
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NegativeBins { bins, share } => write!(
+            Self::NegativeBins { bins, share, enough } => write!(
                 f,
                 "{} of the densities came out negative (bins {}) and were set to zero, {:.1} % of the total: small profiles may be missing, \
-                 or bins are too many for the profiles; use fewer bins, a threshold, or the method nnls or em",
+                 or bins are too many for the profiles; use {}, a threshold, or the method auto",
                 bins.len(),
                 numbered(bins),
-                100.0 * share
+                100.0 * share,
+                fewer(*enough)
             ),
             Self::FewProfilesInBin { bins, enough } => write!(
                 f,
                 "fewer than five profiles in bin {}: its density is uncertain; {enough} equal bins would hold five or more each",
                 numbered(bins)
             ),
-            Self::OscillatingBins { from, to } => write!(
+            Self::OscillatingBins { from, to, enough } => write!(
                 f,
-                "densities swing up and down from bin {} to bin {}: noise of the counts, magnified; use fewer bins",
+                "densities swing up and down from bin {} to bin {}: noise of the counts, magnified; use {} or the method auto",
                 from + 1,
-                to + 1
+                to + 1,
+                fewer(*enough)
             ),
             Self::ThresholdMoved { asked, used } => {
                 write!(
@@ -98,12 +127,70 @@ impl fmt::Display for Finding {
     }
 }
 
+/// What to use instead.
+fn fewer(enough: Option<usize>) -> String {
+    match enough {
+        Some(1) => "1 bin".to_owned(),
+        Some(bins) => format!("{bins} equal bins, the most without it"),
+        None => "fewer bins".to_owned(),
+    }
+}
+
 /// Bins as people count them, from 1.
 fn numbered(bins: &[usize]) -> String {
     bins.iter()
         .map(|bin| (bin + 1).to_string())
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+/// Everything a reader of a result should know.
+pub(crate) fn findings(
+    problem: &Problem,
+    counts: &ProfileCounts,
+    kernel: &Kernel,
+    options: &UnfoldOptions,
+    fit: &Fit,
+    coarse: &[f64],
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if !fit.negative.is_empty() {
+        findings.push(Finding::NegativeBins {
+            bins: fit.negative.iter().map(|&(k, _)| problem.reported[k]).collect(),
+            share: -fit.negative.iter().map(|&(_, density)| density).sum::<f64>() / coarse.iter().sum::<f64>(),
+            enough: None,
+        });
+    }
+    let edges = kernel.sizes().reported_edges().iter().copied();
+    let above: Vec<f64> = edges.filter(|&edge| edge >= problem.threshold).collect();
+    if above.len() > 1 {
+        findings.extend(few_profiles(&above, |x| cumulative(counts, problem.first_row, x)));
+    }
+    // A smooth estimate has no noise to magnify, and the gaps of a sparse one are its answer.
+    if !matches!(fit.method, Method::Penalised | Method::Sparse) {
+        findings.extend(oscillation(coarse));
+    }
+    if let Some(asked) = options.min_size
+        && problem.threshold > asked * (1.0 + 1e-9)
+    {
+        findings.push(Finding::ThresholdMoved {
+            asked,
+            used: problem.threshold,
+        });
+    }
+    if !fit.converged {
+        findings.push(Finding::NotConverged {
+            iterations: fit.iterations,
+        });
+    }
+    findings
+}
+
+/// Profiles up to size `x` from a row on, spread evenly inside their bins.
+fn cumulative(counts: &ProfileCounts, first_row: usize, x: f64) -> f64 {
+    let bins = counts.edges().windows(2).zip(counts.counts()).skip(first_row);
+    bins.map(|(bin, count)| count * ((x - bin[0]) / (bin[1] - bin[0])).clamp(0.0, 1.0))
+        .sum()
 }
 
 /// Fewer profiles than this in a bin are few: five, as in tests of goodness of fit.
@@ -156,6 +243,7 @@ pub(crate) fn oscillation(densities: &[f64]) -> Option<Finding> {
     (best.1 - best.0 >= 3).then_some(Finding::OscillatingBins {
         from: best.0,
         to: best.1,
+        enough: None,
     })
 }
 
@@ -169,7 +257,11 @@ mod tests {
         assert_eq!(oscillation(&[0.0, 0.0, 1.0, 0.0, 0.0]), None);
         assert_eq!(
             oscillation(&[1.0, 1.1, 10.0, 1.0, 9.0, 9.0]),
-            Some(Finding::OscillatingBins { from: 1, to: 4 })
+            Some(Finding::OscillatingBins {
+                from: 1,
+                to: 4,
+                enough: None
+            })
         );
         assert_eq!(oscillation(&[1.0]), None);
     }

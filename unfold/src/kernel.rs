@@ -1,6 +1,6 @@
 //! Kernels as unfolding takes them, and mixtures of the kernels of several particle types.
 
-use crate::SizeBins;
+use crate::{EdgesError, SizeBins};
 use nalgebra::DMatrix;
 
 /// An absolute kernel with the sizes of its columns.
@@ -28,6 +28,7 @@ pub struct Kernel {
     matrix: DMatrix<f64>,
     sizes: SizeBins,
     unit_volume: f64,
+    unit_surface: Option<f64>,
 }
 
 /// Why a matrix is no kernel, or kernels cannot be mixed.
@@ -59,6 +60,9 @@ pub enum KernelError {
     /// The body's volume is not a positive number.
     #[error("the body's volume at size 1 is {0}: it must be positive and finite")]
     Volume(f64),
+    /// The body's surface is not a positive number.
+    #[error("the body's surface area at size 1 is {0}: it must be positive and finite")]
+    Surface(f64),
     /// Fractions that are none, or as many as there are kernels.
     #[error("{fractions} fractions for {kernels} kernels: give one a kernel, finite and not negative, not all zero")]
     Fractions {
@@ -105,7 +109,31 @@ impl Kernel {
             matrix,
             sizes,
             unit_volume,
+            unit_surface: None,
         })
+    }
+
+    /// With the surface area of the body at size 1 (a sphere's: π), for the surface per unit volume S_V.
+    ///
+    /// # Errors
+    ///
+    /// [`KernelError::Surface`] if it is not a positive number.
+    pub fn with_unit_surface(mut self, unit_surface: f64) -> Result<Self, KernelError> {
+        if !(unit_surface.is_finite() && unit_surface > 0.0) {
+            return Err(KernelError::Surface(unit_surface));
+        }
+        self.unit_surface = Some(unit_surface);
+        Ok(self)
+    }
+
+    /// With several of its bins summed to each bin that is reported.
+    ///
+    /// # Errors
+    ///
+    /// [`EdgesError`] if the edges make no bins or are not among those of the kernel's.
+    pub fn reported_in(mut self, edges: &[f64]) -> Result<Self, EdgesError> {
+        self.sizes = self.sizes.reported_in(edges)?;
+        Ok(self)
     }
 
     /// The kernel of several types that share one size distribution, with given fractions of the particles: eqs. (10)-(12).
@@ -131,7 +159,10 @@ impl Kernel {
             .zip(fractions)
             .map(|(kernel, p)| kernel.unit_volume * p / whole)
             .sum();
-        Self::new(matrix, first.sizes.clone(), unit_volume)
+        let mut mixed = Self::new(matrix, first.sizes.clone(), unit_volume)?;
+        let surfaces = kernels.iter().zip(fractions);
+        mixed.unit_surface = surfaces.map(|(kernel, p)| Some(kernel.unit_surface? * p / whole)).sum();
+        Ok(mixed)
     }
 
     /// Rows: profile bins; columns: size bins; lengths.
@@ -150,6 +181,12 @@ impl Kernel {
     #[must_use]
     pub fn unit_volume(&self) -> f64 {
         self.unit_volume
+    }
+
+    /// Surface area of the body at size 1, if it is known.
+    #[must_use]
+    pub fn unit_surface(&self) -> Option<f64> {
+        self.unit_surface
     }
 
     /// Ratio of the largest to the smallest singular value of the matrix: how much noise may grow; infinite if it is singular.

@@ -54,7 +54,11 @@
 //!
 //! | [`Method`] | what | when |
 //! |---|---|---|
-//! | [`Method::Em`] | maximum of the Poisson likelihood, converged | the default; any number of profile bins |
+//! | [`Method::Auto`] | the smooth or the sparse estimate, by their evidence | the default; wants some 40 size bins and 100 profile bins in the kernel |
+//! | [`Method::Penalised`] | penalised likelihood, smooth as the counts say | broad distributions of sizes |
+//! | [`Method::Sparse`] | likelihood on as few bins as the counts bear | particles of a few sizes |
+//! | [`Method::Em`] | maximum of the Poisson likelihood, converged | any distribution, with its noise |
+//! | [`Method::Ems`] | EM with smoothing after every step | for comparison with other programs |
 //! | [`Method::Nnls`] | non-negative least squares | for comparison with other programs |
 //! | [`Method::Paper`] | K⁻¹, negative densities set to zero | to repeat the paper; noise grows with the condition number (spheres 14, slender spheroids 1500) |
 //!
@@ -62,21 +66,32 @@
 //! total is wrong).
 
 mod bootstrap;
+mod cholesky;
+mod estimator;
 mod expectation_maximisation;
 mod finding;
 mod inverse;
 mod kernel;
+mod log_densities;
 mod nnls;
+mod normal;
 mod options;
 mod particle_types;
+mod penalised;
+mod problem;
 mod profile_counts;
 mod size_bins;
+mod size_distribution;
+mod sparse;
 mod unfolding;
 
 pub use finding::Finding;
 pub use kernel::{Kernel, KernelError, mix_kernels};
-pub use options::{Bootstrap, Method, UnfoldOptions};
+pub use options::{Bootstrap, Method, Resampling, UnfoldOptions};
 pub use particle_types::{TypesUnfolding, unfold_types, unfold_types_with_progress};
 pub use profile_counts::{ProfileCounts, ProfilesError};
-pub use size_bins::{EdgesError, SizeBins, equal_edges, geometric_edges};
-pub use unfolding::{Estimate, Interval, Progress, UnfoldError, Unfolding, unfold, unfold_with_progress};
+pub use size_bins::{EdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges};
+pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
+pub use unfolding::{
+    CrossCheck, Estimate, Interval, PenaltyUsed, Progress, UnfoldError, Unfolding, unfold, unfold_with_progress,
+};

@@ -1,7 +1,11 @@
 //! Several particle types or categories whose profiles are told apart: eq. (9).
 
-use crate::unfolding::{Sums, unfold_replicated};
-use crate::{Estimate, Interval, Kernel, ProfileCounts, Progress, UnfoldError, UnfoldOptions, Unfolding};
+use crate::bootstrap::Replicates;
+use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
+use crate::unfolding::{Quantities, Replicated, sum_of_group, unfold_replicated};
+use crate::{
+    Bootstrap, Estimate, Interval, Kernel, ProfileCounts, Progress, Resampling, UnfoldError, UnfoldOptions, Unfolding,
+};
 use std::ops::ControlFlow;
 
 /// Number densities of several types, each and together.
@@ -20,6 +24,10 @@ pub struct TypesUnfolding {
     pub mean_size: Estimate,
     /// Share of the volume in particles of all types.
     pub volume_fraction: Estimate,
+    /// Surface of particles of all types per unit volume, if all kernels know their body's.
+    pub surface_density: Option<Estimate>,
+    /// Means, percentiles and the sieve curve of all types.
+    pub distribution: SizeDistribution,
     /// Profiles per unit area by profile bin, all types.
     pub observed: Vec<f64>,
     /// Σ H_i K_i N_Vi, eq. (9).
@@ -49,89 +57,94 @@ pub fn unfold_types_with_progress(
     progress: Progress<'_>,
 ) -> Result<TypesUnfolding, UnfoldError> {
     let (first_counts, first_kernel) = types.first().ok_or(UnfoldError::Bins { index: 0 })?;
-    let differs = |(counts, kernel): &(ProfileCounts, Kernel)| {
-        counts.edges() != first_counts.edges() || kernel.sizes().edges() != first_kernel.sizes().edges()
-    };
+    let sizes = first_kernel.sizes();
+    let differs =
+        |(counts, kernel): &(ProfileCounts, Kernel)| counts.edges() != first_counts.edges() || kernel.sizes() != sizes;
     if let Some(index) = types.iter().position(differs) {
         return Err(UnfoldError::Bins { index });
     }
     let mut parts = Vec::with_capacity(types.len());
     for (index, (counts, kernel)) in types.iter().enumerate() {
-        // Streams of different types are far apart: more replicates than 2^32 are never drawn.
-        let stream = (index as u64) << 32;
+        // Streams of different types are far apart: more replicates than 2^32 are never drawn. Slices are the same for all types.
+        let slices = options.bootstrap.is_some_and(|of| of.resampling == Resampling::Slices);
+        let stream = if slices { 0 } else { (index as u64) << 32 };
         let share = |done: f64| progress((index as f64 + done) / types.len() as f64);
         parts.push(unfold_replicated(counts, kernel, options, stream, &share)?);
     }
-    let bins = first_kernel.sizes().len();
-    let columns: Vec<usize> = (0..bins).collect();
-    let part_densities = |part: usize| -> Vec<f64> {
-        parts[part]
-            .0
-            .number_density
-            .iter()
-            .map(|density| density.unwrap_or(0.0))
-            .collect()
+    // Densities of all types one behind the other, and so their replicates.
+    let densities: Vec<f64> = parts.iter().flat_map(|part| part.1.clone()).collect();
+    let replicates = options.bootstrap.map(|bootstrap| joined(&bootstrap, &parts));
+    let quantities = Quantities {
+        densities: &densities,
+        replicates: replicates.as_ref(),
     };
-    let add = |mut left: Vec<f64>, right: Vec<f64>| {
-        left.iter_mut().zip(right).for_each(|(l, r)| *l += r);
-        left
-    };
-    let sums = |densities: &dyn Fn(usize) -> Vec<f64>| {
-        types
-            .iter()
-            .enumerate()
-            .fold(Sums::default(), |all, (part, (_, kernel))| {
-                let one = Sums::of(&densities(part), &columns, kernel);
-                Sums {
-                    total: all.total + one.total,
-                    length: all.length + one.length,
-                    volume: all.volume + one.volume,
-                }
-            })
-    };
-    // Replicates of the sum: the types' replicates, number by number; they are independent.
-    let replicates = options.bootstrap.map(|bootstrap| bootstrap.replicates).unwrap_or(0);
-    let drawn = |part: usize, number: usize| -> Vec<f64> {
-        parts[part]
-            .1
-            .as_ref()
-            .map_or_else(|| vec![0.0; bins], |replicates| replicates.densities[number].clone())
-    };
-    let interval = |quantity: &dyn Fn(usize) -> f64| {
-        options.bootstrap.map(|bootstrap| {
-            let densities = (0..replicates).map(|number| vec![quantity(number)]).collect();
-            crate::bootstrap::Replicates {
-                densities,
-                level: bootstrap.level,
-            }
-            .interval(|value| value[0])
-        })
-    };
-    let estimate = |f: fn(&Sums) -> f64| Estimate {
-        value: f(&sums(&part_densities)),
-        interval: interval(&|number| f(&sums(&|part| drawn(part, number)))),
-    };
-    let known: Vec<bool> = (0..bins)
-        .map(|j| parts.iter().any(|(part, _)| part.number_density[j].is_some()))
+    let bins = sizes.len();
+    let volumes: Vec<f64> = types.iter().map(|(_, kernel)| kernel.unit_volume()).collect();
+    let by_number = |all: &[f64]| weighed(all, &vec![1.0; volumes.len()], bins);
+    let by_volume = |all: &[f64]| weighed(all, &volumes, bins);
+    let moments = Moments::new(sizes);
+    let groups = sizes.groups();
+    let reported = sizes.reported_edges().len() - 1;
+    let known: Vec<bool> = (0..reported)
+        .map(|j| parts.iter().any(|part| part.0.number_density[j].is_some()))
         .collect();
-    let total_densities = (0..types.len()).map(part_densities).fold(vec![0.0; bins], add);
-    let bin_interval = |j: usize| {
-        interval(&|number| (0..types.len()).map(|part| drawn(part, number)[j]).sum::<f64>()).filter(|_| known[j])
-    };
+    let of_bin = |all: &[f64], j: usize| sum_of_group(&by_number(all), &groups, j);
     let profile_bins = first_counts.counts().len();
     let summed = |of: fn(&Unfolding) -> &Vec<f64>| {
-        parts
-            .iter()
-            .fold(vec![0.0; profile_bins], |all, (part, _)| add(all, of(part).clone()))
+        let mut sum = vec![0.0; profile_bins];
+        for part in &parts {
+            sum.iter_mut().zip(of(&part.0)).for_each(|(sum, value)| *sum += value);
+        }
+        sum
     };
+    let surfaces: Option<Vec<f64>> = types.iter().map(|(_, kernel)| kernel.unit_surface()).collect();
     Ok(TypesUnfolding {
-        number_density: (0..bins).map(|j| known[j].then_some(total_densities[j])).collect(),
-        intervals: options.bootstrap.map(|_| (0..bins).map(bin_interval).collect()),
-        total: estimate(|sums| sums.total),
-        mean_size: estimate(Sums::mean_size),
-        volume_fraction: estimate(|sums| sums.volume),
+        number_density: (0..reported).map(|j| known[j].then(|| of_bin(&densities, j))).collect(),
+        intervals: replicates.as_ref().map(|_| {
+            let interval = |j: usize| quantities.bin(&|all| of_bin(all, j)).filter(|_| known[j]);
+            (0..reported).map(interval).collect()
+        }),
+        total: quantities.estimate(&|all| all.iter().sum()),
+        mean_size: quantities.estimate(&|all| moments.mean(&by_number(all), Weighing::Number)),
+        volume_fraction: quantities.estimate(&|all| moments.sum(&by_volume(all), 3)),
+        surface_density: surfaces
+            .map(|surfaces| quantities.estimate(&|all| moments.sum(&weighed(all, &surfaces, bins), 2))),
+        distribution: describe(&moments, sizes.reported_edges(), |weighing, quantity| {
+            quantities.estimate(&|all| match weighing {
+                Weighing::Number => quantity(&by_number(all)),
+                Weighing::Volume => quantity(&by_volume(all)),
+            })
+        }),
         observed: summed(|part| &part.observed),
         refolded: summed(|part| &part.refolded),
-        types: parts.into_iter().map(|(part, _)| part).collect(),
+        types: parts.into_iter().map(|part| part.0).collect(),
     })
+}
+
+/// Σ over types of weight × density, by bin of the kernel.
+fn weighed(all: &[f64], weights: &[f64], bins: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; bins];
+    for (type_densities, weight) in all.chunks(bins).zip(weights) {
+        sum.iter_mut()
+            .zip(type_densities)
+            .for_each(|(sum, n)| *sum += weight * n);
+    }
+    sum
+}
+
+/// Replicates of all types, number by number.
+fn joined(bootstrap: &Bootstrap, parts: &[Replicated]) -> Replicates {
+    let of = |part: &Replicated, number: Option<usize>| -> Vec<f64> {
+        part.2.as_ref().map_or_else(Vec::new, |replicates| match number {
+            None => replicates.base.clone(),
+            Some(number) => replicates.densities[number].clone(),
+        })
+    };
+    let all = |number: Option<usize>| parts.iter().flat_map(|part| of(part, number)).collect();
+    Replicates {
+        base: all(None),
+        densities: (0..bootstrap.replicates).map(|number| all(Some(number))).collect(),
+        bootstrap: *bootstrap,
+        slices: parts.iter().filter_map(|part| part.2.as_ref()?.slices).min(),
+    }
 }

@@ -24,6 +24,10 @@ pub struct ProfileCounts {
     area: f64,
     profiles: usize,
     dispersion: f64,
+    /// Σ π d² / 4 by bin.
+    areas: Vec<f64>,
+    /// Counts of each slice.
+    slices: Option<Vec<Vec<f64>>>,
 }
 
 /// Why profiles cannot be counted.
@@ -59,6 +63,14 @@ pub enum ProfilesError {
     WeightCount {
         /// Number of weights.
         weights: usize,
+        /// Number of sizes.
+        sizes: usize,
+    },
+    /// Slices and sizes differ in number.
+    #[error("{slices} slices for {sizes} sizes: tell the slice of every profile")]
+    SliceCount {
+        /// Number of slices.
+        slices: usize,
         /// Number of sizes.
         sizes: usize,
     },
@@ -136,6 +148,7 @@ impl ProfileCounts {
             });
         }
         let mut counts = vec![0.0; edges.len() - 1];
+        let mut areas = vec![0.0; edges.len() - 1];
         let (mut profiles, mut squares) = (0, 0.0);
         for (index, &size) in sizes.iter().enumerate() {
             let weight = weight_of(index);
@@ -145,6 +158,7 @@ impl ProfileCounts {
                 continue;
             }
             counts[below - 1] += weight;
+            areas[below - 1] += weight * 0.25 * std::f64::consts::PI * size * size;
             squares += weight * weight;
             profiles += 1;
         }
@@ -158,7 +172,62 @@ impl ProfileCounts {
             area,
             profiles,
             dispersion: squares / total,
+            areas,
+            slices: None,
         })
+    }
+
+    /// [`from_sizes`](Self::from_sizes) with the slice each profile is on, so that slices can be drawn again ([`Resampling::Slices`](crate::Resampling)).
+    ///
+    /// `area` is that of all slices together; slices are taken to be equally large, and one without profiles is only known of if its number
+    /// lies between others': numbers run from 0 to the largest.
+    ///
+    /// # Errors
+    ///
+    /// As [`from_sizes`](Self::from_sizes), and [`ProfilesError::SliceCount`].
+    ///
+    /// ```
+    /// use stereology_unfold::ProfileCounts;
+    /// let counts = ProfileCounts::from_slices(&[0.2, 0.9, 0.4], None, &[0, 2, 2], &[0.0, 0.5, 1.0], 3.0)?;
+    /// assert_eq!(counts.slices(), Some(3));
+    /// # Ok::<(), stereology_unfold::ProfilesError>(())
+    /// ```
+    pub fn from_slices(
+        sizes: &[f64],
+        weights: Option<&[f64]>,
+        slices: &[usize],
+        edges: &[f64],
+        area: f64,
+    ) -> Result<Self, ProfilesError> {
+        let mut whole = Self::from_sizes(sizes, weights, edges, area)?;
+        if slices.len() != sizes.len() {
+            return Err(ProfilesError::SliceCount {
+                slices: slices.len(),
+                sizes: sizes.len(),
+            });
+        }
+        // Numbers need not be dense: slices that hold nothing at all beyond a million are not counted one by one.
+        let mut numbers: Vec<usize> = slices.to_vec();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let dense = numbers.last().is_some_and(|&last| last < 1_000_000);
+        let place = |slice: usize| {
+            if dense {
+                slice
+            } else {
+                numbers.partition_point(|&n| n < slice)
+            }
+        };
+        let count = numbers.last().map_or(0, |&last| place(last) + 1);
+        let mut by_slice = vec![vec![0.0; edges.len() - 1]; count];
+        for (index, (&size, &slice)) in sizes.iter().zip(slices).enumerate() {
+            let below = edges.partition_point(|&edge| edge < size);
+            if below > 0 {
+                by_slice[place(slice)][below - 1] += weights.map_or(1.0, |weights| weights[index]);
+            }
+        }
+        whole.slices = Some(by_slice);
+        Ok(whole)
     }
 
     /// Counts that are known by bin, whole numbers or expectations.
@@ -187,6 +256,12 @@ impl ProfileCounts {
             area,
             profiles: total.round() as usize,
             dispersion: 1.0,
+            areas: edges
+                .windows(2)
+                .zip(counts)
+                .map(|(bin, count)| count * mean_profile_area(bin))
+                .collect(),
+            slices: None,
         })
     }
 
@@ -208,6 +283,23 @@ impl ProfileCounts {
         self.counts.iter().map(|count| count / self.area).collect()
     }
 
+    /// Share of the area in profiles by bin; A_A is their sum. From counts, with sizes spread over each bin.
+    #[must_use]
+    pub fn area_fractions(&self) -> Vec<f64> {
+        self.areas.iter().map(|area| area / self.area).collect()
+    }
+
+    /// How many slices there are, if profiles came with theirs.
+    #[must_use]
+    pub fn slices(&self) -> Option<usize> {
+        self.slices.as_ref().map(Vec::len)
+    }
+
+    /// Counts of each slice.
+    pub(crate) fn by_slice(&self) -> Option<&[Vec<f64>]> {
+        self.slices.as_deref()
+    }
+
     /// The examined area.
     #[must_use]
     pub fn area(&self) -> f64 {
@@ -225,6 +317,12 @@ impl ProfileCounts {
     pub fn dispersion(&self) -> f64 {
         self.dispersion
     }
+}
+
+/// Mean area of profiles with sizes spread over a bin.
+pub(crate) fn mean_profile_area(bin: &[f64]) -> f64 {
+    let (a, b) = (bin[0], bin[1]);
+    std::f64::consts::PI / 12.0 * (a * a + a * b + b * b)
 }
 
 fn check_area(area: f64) -> Result<(), ProfilesError> {

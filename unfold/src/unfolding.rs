@@ -1,11 +1,13 @@
-//! From profiles per area to particles per volume: the fit, what it claims, and how far to trust it.
+//! From profiles per area to particles per volume: the result, what it claims, and how far to trust it.
 
-use crate::bootstrap::{Replicates, replicate};
-use crate::expectation_maximisation::maximise;
-use crate::finding::{Finding, few_profiles, oscillation};
+use crate::bootstrap::{Deviation, Replicates, Source, replicate, slices_drawn};
+use crate::estimator::{Fit, again, estimate, workspace};
+use crate::finding::{Finding, findings};
 use crate::kernel::condition_number;
-use crate::{Bootstrap, Kernel, Method, ProfileCounts, UnfoldOptions, inverse, nnls};
-use nalgebra::{DMatrix, DVector};
+use crate::problem::Problem;
+use crate::profile_counts::mean_profile_area;
+use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
+use crate::{EdgesError, Kernel, Method, ProfileCounts, UnfoldOptions};
 use std::ops::ControlFlow;
 
 /// Called with the share done, from any thread; `Break` cancels.
@@ -56,6 +58,14 @@ pub enum UnfoldError {
     /// A tolerance that is not positive.
     #[error("the tolerance {0} must be positive")]
     Tolerance(f64),
+    /// A smoothing that is none.
+    #[error("the smoothing {0} must lie between 0 and 0.25")]
+    Smoothing(f64),
+    /// Slices to draw again that are not there.
+    #[error(
+        "slices can be drawn again from two or more, there are {0}: give the slice of every profile, or draw counts"
+    )]
+    TooFewSlices(usize),
     /// Several types on different bins, or no type.
     #[error(
         "type {index} has other bins than the first, or there is no type: several types are unfolded on common edges"
@@ -64,6 +74,9 @@ pub enum UnfoldError {
         /// Which, from 0.
         index: usize,
     },
+    /// Edges that make no bins.
+    #[error(transparent)]
+    Edges(#[from] EdgesError),
     /// The caller broke off.
     #[error("cancelled")]
     Cancelled,
@@ -83,8 +96,26 @@ pub struct Interval {
 pub struct Estimate {
     /// The value.
     pub value: f64,
-    /// Percentile interval of the bootstrap; see [`Bootstrap`] for what it is worth.
+    /// Bias-corrected interval of the bootstrap; see [`Bootstrap`](crate::Bootstrap) for how and what it is worth.
     pub interval: Option<Interval>,
+}
+
+/// Two ways to the same number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossCheck {
+    /// As counted on the sections.
+    pub observed: f64,
+    /// As the densities have it.
+    pub expected: f64,
+}
+
+/// The penalty of a smooth estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PenaltyUsed {
+    /// Order of the differences of highest evidence: 1, 2 or 3.
+    pub order: usize,
+    /// Its weight λ; depends on the number of bins of the kernel.
+    pub weight: f64,
 }
 
 /// Particles per unit volume, by size, and everything needed to judge them.
@@ -93,7 +124,8 @@ pub struct Estimate {
 pub struct Unfolding {
     /// Edges of the size bins.
     pub edges: Vec<f64>,
-    /// Particles per unit volume in each size bin; `None` where no profile above the threshold can come from.
+    /// Particles per unit volume in each size bin; `None` where no profile above the threshold can come from. Of a bin the threshold falls in, if the
+    /// kernel's bins have an edge there, only those above.
     pub number_density: Vec<Option<f64>>,
     /// Intervals of `number_density`, with a bootstrap.
     pub intervals: Option<Vec<Option<Interval>>>,
@@ -101,24 +133,39 @@ pub struct Unfolding {
     pub total: Estimate,
     /// Mean size of these particles; zero if there are none.
     pub mean_size: Estimate,
-    /// Share of the volume in these particles.
+    /// Share of the volume in these particles, V_V.
     pub volume_fraction: Estimate,
+    /// Surface of these particles per unit volume, S_V, if the kernel knows the body's surface.
+    pub surface_density: Option<Estimate>,
+    /// Means and percentiles by number and by volume, and the sieve curve.
+    pub distribution: SizeDistribution,
     /// How many profiles were counted, above the threshold or not.
     pub profiles: usize,
+    /// Edges of the profile bins.
+    pub profile_edges: Vec<f64>,
     /// Profiles per unit area by profile bin, as observed (N_A), below the threshold too.
     pub observed: Vec<f64>,
     /// Profiles per unit area that the number densities would show: K N_V, below the threshold too.
     pub refolded: Vec<f64>,
-    /// Poisson deviance of the counts from the refolded ones above the threshold: near `degrees_of_freedom` for a good fit.
+    /// Eq. (1), N_A = H N_V: profiles above the threshold per unit area.
+    pub profiles_per_area: CrossCheck,
+    /// V_V = A_A: the area fraction of the profiles above the threshold, against the volume fraction; with a threshold, against what the densities would
+    /// show above it.
+    pub area_fraction: CrossCheck,
+    /// Poisson deviance of the counts from the refolded ones above the threshold: near `degrees_of_freedom` for a good fit if bins hold five or more.
     pub deviance: f64,
-    /// Profile bins less size bins of the fit, not below zero.
+    /// Profile bins less parameters in effect, not below zero.
     pub degrees_of_freedom: usize,
-    /// Condition number of the kernel of the fit.
+    /// Condition number of the kernel of the reported bins.
     pub condition_number: f64,
     /// The threshold that was used: the lowest profile size of the fit.
     pub threshold: f64,
-    /// The estimator.
+    /// The estimator that was used; never [`Method::Auto`].
     pub method: Method,
+    /// ln evidence of the sparse estimate less that of the smooth one, if [`Method::Auto`] chose: sparse from 3 on.
+    pub evidence_for_sparse: Option<f64>,
+    /// The penalty of a smooth estimate.
+    pub penalty: Option<PenaltyUsed>,
     /// Size bins whose negative density was set to zero, from 0.
     pub clamped_bins: Vec<usize>,
     /// Steps of the estimator; zero for the paper's.
@@ -178,291 +225,175 @@ pub fn unfold_with_progress(
     options: &UnfoldOptions,
     progress: Progress<'_>,
 ) -> Result<Unfolding, UnfoldError> {
-    unfold_replicated(counts, kernel, options, 0, progress).map(|(unfolding, _)| unfolding)
+    unfold_replicated(counts, kernel, options, 0, progress).map(|(unfolding, ..)| unfolding)
 }
 
-/// The unfolding and the densities of its bootstrap, drawn from streams beginning at `stream`.
+/// An unfolding, its densities on all bins of the kernel, and those of its bootstrap.
+pub(crate) type Replicated = (Unfolding, Vec<f64>, Option<Replicates>);
+
+/// Unfolds, with the bootstrap drawn from streams beginning at `stream`.
 pub(crate) fn unfold_replicated(
     counts: &ProfileCounts,
     kernel: &Kernel,
     options: &UnfoldOptions,
     stream: u64,
     progress: Progress<'_>,
-) -> Result<(Unfolding, Option<Replicates>), UnfoldError> {
+) -> Result<Replicated, UnfoldError> {
     let problem = Problem::new(counts, kernel, options)?;
-    let fit = problem.fit(&problem.counts)?;
+    let fit = estimate(&problem, &problem.counts, options)?;
+    let bins = kernel.sizes().len();
     let replicates = match &options.bootstrap {
         None => None,
         Some(bootstrap) => {
+            let slices = slices_drawn(bootstrap, counts.slices())?;
+            let mut room = workspace(&problem);
+            let base = again(&problem, &problem.counts, &fit.again, options, &mut room)?;
+            let expected = problem.refold(&base);
+            let by_slice: Vec<Vec<f64>> = match (slices, counts.by_slice()) {
+                (Some(_), Some(by_slice)) => by_slice
+                    .iter()
+                    .map(|slice| {
+                        let above = slice[problem.first_row..].iter();
+                        above.map(|count| count / counts.dispersion()).collect()
+                    })
+                    .collect(),
+                _ => Vec::new(),
+            };
+            let source = if slices.is_some() {
+                Source::Slices(&by_slice)
+            } else {
+                Source::Expected(&expected)
+            };
             let densities = replicate(
                 bootstrap,
                 stream,
-                &problem.refold(&fit.densities),
-                counts.dispersion(),
+                &source,
+                problem.columns.len(),
                 progress,
-                |drawn| problem.fit(drawn).map(|fit| fit.densities),
+                || workspace(&problem),
+                |drawn, room| again(&problem, drawn, &fit.again, options, room),
             )?;
             Some(Replicates {
-                densities,
-                level: bootstrap.level,
+                base: problem.widen(&base, bins),
+                densities: densities.iter().map(|one| problem.widen(one, bins)).collect(),
+                bootstrap: *bootstrap,
+                slices,
             })
         }
     };
-    let unfolding = problem.describe(counts, kernel, &fit, replicates.as_ref());
-    // Replicates of all size bins, for sums over types; bins without a density stay zero.
-    let widened = replicates.map(|replicates| replicates.widened(&problem.columns, kernel.sizes().len()));
-    Ok((unfolding, widened))
+    let unfolding = result(&problem, counts, kernel, options, &fit, replicates.as_ref());
+    Ok((unfolding, problem.widen(&fit.densities, bins), replicates))
 }
 
-/// The part of counts and kernel above the threshold.
-struct Problem<'a> {
-    /// Expected counts of one particle per unit volume: kernel times area.
-    matrix: DMatrix<f64>,
-    counts: Vec<f64>,
-    /// Index of each column among the size bins.
-    columns: Vec<usize>,
-    first_row: usize,
-    threshold: f64,
-    options: &'a UnfoldOptions,
+/// Quantities of densities on all bins of a kernel, with their intervals.
+pub(crate) struct Quantities<'a> {
+    pub(crate) densities: &'a [f64],
+    pub(crate) replicates: Option<&'a Replicates>,
 }
 
-/// Densities of the columns of a problem.
-struct Fit {
-    densities: Vec<f64>,
-    /// What was below zero, by column.
-    negative: Vec<(usize, f64)>,
-    iterations: usize,
-    converged: bool,
-}
-
-impl<'a> Problem<'a> {
-    fn new(counts: &ProfileCounts, kernel: &Kernel, options: &'a UnfoldOptions) -> Result<Self, UnfoldError> {
-        let matrix = kernel.matrix();
-        if counts.counts().len() != matrix.nrows() {
-            return Err(UnfoldError::Rows {
-                counts: counts.counts().len(),
-                rows: matrix.nrows(),
-            });
-        }
-        if let Some(bootstrap @ Bootstrap { replicates, level, .. }) = options.bootstrap
-            && (bootstrap.replicates < 2 || !(level > 0.0 && level < 1.0))
-        {
-            return Err(UnfoldError::Bootstrap { replicates, level });
-        }
-        if options.tolerance.is_nan() || options.tolerance <= 0.0 {
-            return Err(UnfoldError::Tolerance(options.tolerance));
-        }
-        let asked = options.min_size.unwrap_or(0.0);
-        if !(asked.is_finite() && asked >= 0.0) {
-            return Err(UnfoldError::Threshold(asked));
-        }
-        let edges = counts.edges();
-        // A threshold that is an edge but for rounding is that edge.
-        let first_row = edges.partition_point(|&edge| edge < asked * (1.0 - 1e-12));
-        let kept = counts.counts().get(first_row..).unwrap_or(&[]);
-        if kept.iter().sum::<f64>() <= 0.0 {
-            return Err(UnfoldError::Threshold(asked));
-        }
-        let rows = matrix.rows(first_row, kept.len());
-        let columns: Vec<usize> = (0..matrix.ncols()).filter(|&j| rows.column(j).sum() > 0.0).collect();
-        if let Some(bin) = (0..kept.len()).find(|&i| kept[i] > 0.0 && rows.row(i).sum() <= 0.0) {
-            return Err(UnfoldError::Unexplained { bin: bin + first_row });
-        }
-        Ok(Self {
-            matrix: rows.select_columns(&columns) * counts.area(),
-            counts: kept.to_vec(),
-            columns,
-            first_row,
-            threshold: edges[first_row],
-            options,
-        })
-    }
-
-    fn fit(&self, counts: &[f64]) -> Result<Fit, UnfoldError> {
-        match self.options.method {
-            Method::Paper => {
-                let (rows, columns) = self.matrix.shape();
-                if rows != columns {
-                    return Err(UnfoldError::NotSquare { rows, columns });
-                }
-                let solution =
-                    inverse::solve(&self.matrix, &DVector::from_column_slice(counts)).ok_or(UnfoldError::Singular)?;
-                Ok(Fit {
-                    densities: solution.iter().map(|density| density.max(0.0)).collect(),
-                    negative: solution
-                        .iter()
-                        .copied()
-                        .enumerate()
-                        .filter(|(_, density)| *density < 0.0)
-                        .collect(),
-                    iterations: 0,
-                    converged: true,
-                })
-            }
-            Method::Nnls => {
-                let found = nnls::minimise(&self.matrix, &DVector::from_column_slice(counts));
-                let densities = found.solution.iter().copied().collect();
-                Ok(Fit {
-                    densities,
-                    negative: Vec::new(),
-                    iterations: found.iterations,
-                    converged: found.converged,
-                })
-            }
-            Method::Em => {
-                let found = maximise(
-                    &self.matrix,
-                    counts,
-                    self.options.tolerance,
-                    self.options.max_iterations,
-                );
-                Ok(Fit {
-                    densities: found.densities,
-                    negative: Vec::new(),
-                    iterations: found.iterations,
-                    converged: found.converged,
-                })
-            }
+impl Quantities<'_> {
+    pub(crate) fn estimate(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
+        let value = quantity(self.densities);
+        Estimate {
+            value,
+            interval: self
+                .replicates
+                .map(|replicates| replicates.interval(value, Deviation::Spread, quantity)),
         }
     }
 
-    /// Expected counts.
-    fn refold(&self, densities: &[f64]) -> Vec<f64> {
-        (&self.matrix * DVector::from_column_slice(densities))
-            .iter()
-            .copied()
-            .collect()
-    }
-
-    fn describe(
-        &self,
-        counts: &ProfileCounts,
-        kernel: &Kernel,
-        fit: &Fit,
-        replicates: Option<&Replicates>,
-    ) -> Unfolding {
-        let sizes = kernel.sizes();
-        let mut number_density = vec![None; sizes.len()];
-        for (&j, &density) in self.columns.iter().zip(&fit.densities) {
-            number_density[j] = Some(density);
-        }
-        let sum = |densities: &[f64]| Sums::of(densities, &self.columns, kernel);
-        let (rows, columns) = self.matrix.shape();
-        let mut densities = DVector::zeros(sizes.len());
-        for (&j, &density) in self.columns.iter().zip(&fit.densities) {
-            densities[j] = density;
-        }
-        let estimate = |f: fn(&Sums) -> f64| Estimate {
-            value: f(&sum(&fit.densities)),
-            interval: replicates.map(|replicates| replicates.interval(|densities| f(&sum(densities)))),
-        };
-        let intervals = replicates.map(|replicates| {
-            let mut intervals = vec![None; sizes.len()];
-            for (k, &j) in self.columns.iter().enumerate() {
-                intervals[j] = Some(replicates.interval(|densities| densities[k]));
-            }
-            intervals
-        });
-        Unfolding {
-            edges: sizes.edges().to_vec(),
-            number_density,
-            intervals,
-            total: estimate(|sums| sums.total),
-            mean_size: estimate(Sums::mean_size),
-            volume_fraction: estimate(|sums| sums.volume),
-            profiles: counts.profiles(),
-            observed: counts.per_area(),
-            refolded: (kernel.matrix() * densities).iter().copied().collect(),
-            deviance: deviance(&self.counts, &self.refold(&fit.densities)) / counts.dispersion(),
-            degrees_of_freedom: rows.saturating_sub(columns),
-            condition_number: condition_number(&self.matrix),
-            threshold: self.threshold,
-            method: self.options.method,
-            clamped_bins: fit.negative.iter().map(|&(k, _)| self.columns[k]).collect(),
-            iterations: fit.iterations,
-            findings: self.findings(counts, kernel, fit),
-        }
-    }
-
-    fn findings(&self, counts: &ProfileCounts, kernel: &Kernel, fit: &Fit) -> Vec<Finding> {
-        let mut findings = Vec::new();
-        if !fit.negative.is_empty() {
-            findings.push(Finding::NegativeBins {
-                bins: fit.negative.iter().map(|&(k, _)| self.columns[k]).collect(),
-                share: -fit.negative.iter().map(|&(_, density)| density).sum::<f64>()
-                    / fit.densities.iter().sum::<f64>(),
-            });
-        }
-        let above: Vec<f64> = kernel
-            .sizes()
-            .edges()
-            .iter()
-            .copied()
-            .filter(|&edge| edge >= self.threshold)
-            .collect();
-        if above.len() > 1 {
-            findings.extend(few_profiles(&above, |x| cumulative(counts, self.first_row, x)));
-        }
-        findings.extend(oscillation(&fit.densities));
-        if let Some(asked) = self.options.min_size
-            && self.threshold > asked * (1.0 + 1e-9)
-        {
-            findings.push(Finding::ThresholdMoved {
-                asked,
-                used: self.threshold,
-            });
-        }
-        if !fit.converged {
-            findings.push(Finding::NotConverged {
-                iterations: fit.iterations,
-            });
-        }
-        findings
+    pub(crate) fn bin(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Option<Interval> {
+        let value = quantity(self.densities);
+        self.replicates
+            .map(|replicates| replicates.interval(value, Deviation::SpreadAndBias, quantity))
     }
 }
 
-/// Profiles up to size `x` from a row on, spread evenly inside their bins.
-fn cumulative(counts: &ProfileCounts, first_row: usize, x: f64) -> f64 {
-    counts
-        .edges()
-        .windows(2)
-        .zip(counts.counts())
-        .skip(first_row)
-        .map(|(bin, count)| count * ((x - bin[0]) / (bin[1] - bin[0])).clamp(0.0, 1.0))
-        .sum()
+fn result(
+    problem: &Problem,
+    counts: &ProfileCounts,
+    kernel: &Kernel,
+    options: &UnfoldOptions,
+    fit: &Fit,
+    replicates: Option<&Replicates>,
+) -> Unfolding {
+    let sizes = kernel.sizes();
+    let moments = Moments::new(sizes);
+    let densities = problem.widen(&fit.densities, sizes.len());
+    let quantities = Quantities {
+        densities: &densities,
+        replicates,
+    };
+    let estimate = |quantity: &dyn Fn(&[f64]) -> f64| quantities.estimate(quantity);
+    let coarse = problem.gather(&fit.densities);
+    let bins = sizes.reported_edges().len() - 1;
+    let mut number_density = vec![None; bins];
+    let mut intervals = vec![None; bins];
+    let groups = sizes.groups();
+    for (&bin, &density) in problem.reported.iter().zip(&coarse) {
+        number_density[bin] = Some(density);
+        intervals[bin] = quantities.bin(&|densities| sum_of_group(densities, &groups, bin));
+    }
+    let refolded: Vec<f64> = {
+        let wide = nalgebra::DVector::from_column_slice(&densities);
+        (kernel.matrix() * wide).iter().copied().collect()
+    };
+    let volume_fraction = estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
+    let rows = problem.counts.len();
+    Unfolding {
+        edges: sizes.reported_edges().to_vec(),
+        intervals: replicates.map(|_| intervals),
+        total: estimate(&|densities| densities.iter().sum()),
+        mean_size: estimate(&|densities| moments.mean(densities, Weighing::Number)),
+        surface_density: kernel
+            .unit_surface()
+            .map(|surface| estimate(&|densities| surface * moments.sum(densities, 2))),
+        distribution: describe(&moments, sizes.reported_edges(), |_, quantity| estimate(quantity)),
+        profiles: counts.profiles(),
+        profile_edges: counts.edges().to_vec(),
+        observed: counts.per_area(),
+        profiles_per_area: CrossCheck {
+            observed: counts.per_area()[problem.first_row..].iter().sum(),
+            expected: refolded[problem.first_row..].iter().sum(),
+        },
+        area_fraction: CrossCheck {
+            observed: counts.area_fractions()[problem.first_row..].iter().sum(),
+            expected: if problem.first_row == 0 {
+                volume_fraction.value
+            } else {
+                let bins = counts.edges().windows(2).zip(&refolded).skip(problem.first_row);
+                bins.map(|(bin, n)| n * mean_profile_area(bin)).sum()
+            },
+        },
+        volume_fraction,
+        deviance: deviance(&problem.counts, &problem.refold(&fit.densities)),
+        degrees_of_freedom: degrees_of_freedom(rows, fit.parameters),
+        condition_number: condition_number(&problem.coarse),
+        threshold: problem.threshold,
+        method: fit.method,
+        evidence_for_sparse: fit.for_sparse,
+        penalty: fit.penalty.map(|(order, weight)| PenaltyUsed { order, weight }),
+        clamped_bins: fit.negative.iter().map(|&(k, _)| problem.reported[k]).collect(),
+        iterations: fit.iterations,
+        findings: findings(problem, counts, kernel, options, fit, &coarse),
+        number_density,
+        refolded,
+    }
+}
+
+/// Density of a reported bin.
+pub(crate) fn sum_of_group(densities: &[f64], groups: &[usize], bin: usize) -> f64 {
+    let of_bin = densities.iter().zip(groups).filter(|(_, group)| **group == bin);
+    of_bin.map(|(density, _)| density).sum()
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Between zero and the number of rows.
+fn degrees_of_freedom(rows: usize, parameters: f64) -> usize {
+    (rows as f64 - parameters).round().max(0.0) as usize
 }
 
 /// 2 Σ n ln(n / μ) − n + μ. Bins with counts and no expectation would make it infinite.
 fn deviance(counts: &[f64], expected: &[f64]) -> f64 {
     let term = |n: f64, mu: f64| if n > 0.0 { n * (n / mu).ln() - n + mu } else { mu };
     2.0 * counts.iter().zip(expected).map(|(&n, &mu)| term(n, mu)).sum::<f64>()
-}
-
-/// Sums over the particles of all bins.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Sums {
-    pub(crate) total: f64,
-    pub(crate) length: f64,
-    pub(crate) volume: f64,
-}
-
-impl Sums {
-    pub(crate) fn of(densities: &[f64], columns: &[usize], kernel: &Kernel) -> Self {
-        let (means, cubes) = (kernel.sizes().mean_sizes(), kernel.sizes().mean_cubes());
-        let mut sums = Self::default();
-        for (&j, &density) in columns.iter().zip(densities) {
-            sums.total += density;
-            sums.length += density * means[j];
-            sums.volume += density * cubes[j] * kernel.unit_volume();
-        }
-        sums
-    }
-
-    pub(crate) fn mean_size(&self) -> f64 {
-        if self.total > 0.0 {
-            self.length / self.total
-        } else {
-            0.0
-        }
-    }
 }

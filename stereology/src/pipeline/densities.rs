@@ -4,7 +4,8 @@ use crate::pipeline::association::{Association, association};
 use crate::pipeline::{ParticleTypes, ParticleTypesError, Warning};
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
-    Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, equal_edges, unfold_with_progress,
+    Finding, Kernel, Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, divided_edges,
+    equal_edges, unfold, unfold_with_progress,
 };
 
 /// What was measured on the photograph: one entry a profile in each.
@@ -129,8 +130,11 @@ pub fn particle_densities(
         min_size: (threshold > 0.0).then_some(threshold),
         ..options.unfold
     };
-    let profile_edges = profile_edges(&edges, threshold, options.unfold.method);
-    let kernel = types.kernel(&profile_edges, &edges, options.sizes)?;
+    let UnfoldingBins {
+        profile_edges,
+        size_edges,
+    } = UnfoldingBins::new(&edges, threshold, options.unfold.method, options.sizes);
+    let kernel = reported(types.kernel(&profile_edges, &size_edges, options.sizes)?, &edges)?;
     let unfold_these = |places: &[usize], options: &UnfoldOptions| {
         let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
         let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
@@ -183,19 +187,44 @@ pub fn particle_densities(
     })
 }
 
-/// The bins profiles are counted in: those of the particles cut in halves, so that the fit can be judged, with an edge at the threshold, so that no profile
-/// above it is lost. The paper's inverse needs a square kernel: the particles' own bins.
-fn profile_edges(size_edges: &[f64], threshold: f64, method: Method) -> Vec<f64> {
-    let mut edges = size_edges.to_vec();
-    let last = edges.last().copied().unwrap_or(0.0);
-    if method == Method::Paper {
-        return edges;
+/// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
+/// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnfoldingBins {
+    /// Edges of the profile bins.
+    pub profile_edges: Vec<f64>,
+    /// Edges of the size bins of the kernel; those of the reported bins are among them.
+    pub size_edges: Vec<f64>,
+}
+
+/// A hundred profile bins or more lose nothing that shows in the densities.
+const PROFILE_BINS: usize = 100;
+/// Forty size bins or more make the smooth estimate as smooth as can be seen.
+const SIZE_BINS: usize = 40;
+
+impl UnfoldingBins {
+    /// Bins for densities in the bins between `edges`, from a threshold (0: none) on.
+    #[must_use]
+    pub fn new(edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> Self {
+        if method == Method::Paper {
+            return Self {
+                profile_edges: edges.to_vec(),
+                size_edges: edges.to_vec(),
+            };
+        }
+        Self {
+            profile_edges: divided_edges(edges, PROFILE_BINS, threshold),
+            size_edges: match sizes {
+                Sizes::Integrated => divided_edges(edges, SIZE_BINS, threshold),
+                Sizes::UpperEdge => edges.to_vec(),
+            },
+        }
     }
-    edges.extend(size_edges.windows(2).map(|bin| 0.5 * (bin[0] + bin[1])));
-    edges.extend((threshold > 0.0 && threshold < last).then_some(threshold));
-    edges.sort_by(f64::total_cmp);
-    edges.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * last);
-    edges
+}
+
+/// The kernel with its bins summed to those between `edges`.
+pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityError> {
+    kernel.reported_in(edges).map_err(|error| DensityError::Unfold(UnfoldError::Edges(error)))
 }
 
 /// The threshold, raised to the upper edge of its bin if that edge is less than [`SEEN`] times the threshold: a plane that cuts a sphere of diameter D shows it

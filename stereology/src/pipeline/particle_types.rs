@@ -201,7 +201,8 @@ impl ParticleType {
             name: self.name.clone(),
             why: error.to_string(),
         })?;
-        Ok(Kernel::new(matrix, bins, self.law.unit_volume())?)
+        let unit_surface = self.law.surface_area() / self.law.size().powi(2);
+        Ok(Kernel::new(matrix, bins, self.law.unit_volume())?.with_unit_surface(unit_surface)?)
     }
 }
 

@@ -11,7 +11,15 @@ fn counts(sizes: &[f64], bins: usize) -> ProfileCounts {
 fn one_profile_and_equal_profiles_are_unfolded_with_a_warning() {
     let edges = equal_edges(1.0, 10);
     let kernel = spheres::upper_edge(&edges, &edges);
-    for method in [Method::Paper, Method::Nnls, Method::Em] {
+    for method in [
+        Method::Auto,
+        Method::Penalised,
+        Method::Sparse,
+        Method::Em,
+        Method::Ems,
+        Method::Nnls,
+        Method::Paper,
+    ] {
         let options = UnfoldOptions::default().with_method(method);
         let one = unfold(&counts(&[0.55], 10), &kernel, &options).unwrap();
         assert!(one.total.value > 0.0 && one.total.value.is_finite());
@@ -45,7 +53,7 @@ fn what_does_not_fit_is_refused() {
         let bootstrap = Bootstrap {
             replicates,
             level,
-            seed: 0,
+            ..Bootstrap::default()
         };
         assert!(matches!(
             unfold(&some, &kernel, &options.with_bootstrap(bootstrap)),

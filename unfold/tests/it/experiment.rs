@@ -4,6 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
 
+/// Two narrow bands of sizes, with its number of profiles.
+pub(crate) const TWO_BANDS: (&str, f64) = ("twoband", 1200.0);
+
 /// Size distributions on (0, 1], with the number of profiles they are to show.
 pub(crate) const DISTRIBUTIONS: [(&str, f64); 4] = [
     ("single", 1200.0),
@@ -22,6 +25,7 @@ fn density(name: &str, x: f64) -> f64 {
         "single" => bell(0.55, 0.15),
         "bimodal" => bell(0.30, 0.08) + bell(0.75, 0.08),
         "lognormal" => (-0.5 * ((x.ln() - 0.30_f64.ln()) / 0.45).powi(2)).exp() / x,
+        "twoband" => f64::from(u8::from((x > 0.3 && x < 0.4) || (x > 0.7 && x < 0.8))),
         _ => 1.0,
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
-use stereology_unfold::{Kernel, SizeBins};
+use stereology_unfold::{Kernel, SizeBins, divided_edges};
 
 /// D F(d / D): length of offsets at which a sphere of diameter D shows a profile up to d.
 fn below(d: f64, diameter: f64) -> f64 {
@@ -38,4 +38,19 @@ pub(crate) fn integrated(profile_edges: &[f64], size_edges: &[f64]) -> Kernel {
         (mean(profile_edges[i + 1]) - mean(profile_edges[i])).max(0.0)
     });
     Kernel::new(matrix, SizeBins::integrated(size_edges).unwrap(), PI / 6.0).unwrap()
+}
+
+/// The bin-integrated kernel on 40 sub-bins or more, reported in `size_edges`, and the edges of its 100 or more profile bins.
+pub(crate) fn fine(size_edges: &[f64]) -> (Kernel, Vec<f64>) {
+    let sub_edges = divided_edges(size_edges, 40, 0.0);
+    let profile_edges = divided_edges(size_edges, 100, 0.0);
+    let kernel = integrated(&profile_edges, &sub_edges);
+    let sizes = kernel.sizes().clone().reported_in(size_edges).unwrap();
+    (
+        Kernel::new(kernel.matrix().clone(), sizes, PI / 6.0)
+            .unwrap()
+            .with_unit_surface(PI)
+            .unwrap(),
+        profile_edges,
+    )
 }

@@ -1,0 +1,308 @@
+//! Fisher scoring for logarithms of densities: the likelihood of the counts, less a penalty on their roughness.
+
+use crate::cholesky::{Symmetric, dot};
+use nalgebra::DMatrix;
+
+/// Expected counts of one particle per unit volume in each node, column by column, with the rows each column touches.
+#[derive(Clone, Debug)]
+pub(crate) struct Design {
+    rows: usize,
+    entries: Vec<f64>,
+    /// Rows of each column that are not zero: from, to.
+    spans: Vec<(usize, usize)>,
+}
+
+impl Design {
+    pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
+        let spans = matrix
+            .column_iter()
+            .map(|column| {
+                let seen = |k: &f64| *k > 0.0;
+                let from = column.iter().position(seen).unwrap_or(0);
+                (from, column.iter().rposition(seen).map_or(from, |last| last + 1))
+            })
+            .collect();
+        Self {
+            rows: matrix.nrows(),
+            entries: matrix.as_slice().to_vec(),
+            spans,
+        }
+    }
+
+    pub(crate) fn nodes(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// First row and entries of a column.
+    fn column(&self, node: usize) -> (usize, &[f64]) {
+        let (from, to) = self.spans[node];
+        (from, &self.entries[node * self.rows + from..node * self.rows + to])
+    }
+
+    /// Expected counts of a particle of each node.
+    pub(crate) fn column_sum(&self, node: usize) -> f64 {
+        self.column(node).1.iter().sum()
+    }
+
+    /// μ = K x.
+    pub(crate) fn refold(&self, densities: &[f64], expected: &mut [f64]) {
+        expected.fill(0.0);
+        for (node, &density) in densities.iter().enumerate() {
+            let (from, column) = self.column(node);
+            for (mu, k) in expected[from..].iter_mut().zip(column) {
+                *mu += k * density;
+            }
+        }
+    }
+}
+
+/// Σ n ln μ − μ.
+pub(crate) fn log_likelihood(counts: &[f64], expected: &[f64]) -> f64 {
+    let term = |(&n, &mu): (&f64, &f64)| if n > 0.0 { n * mu.ln() - mu } else { -mu };
+    counts.iter().zip(expected).map(term).sum()
+}
+
+/// Weight × the sum of squared differences of an order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Penalty {
+    pub(crate) order: usize,
+    pub(crate) weight: f64,
+}
+
+impl Penalty {
+    /// Nothing is penalised.
+    pub(crate) const NONE: Self = Self { order: 0, weight: 0.0 };
+
+    /// Coefficients of one difference: (−1)^(r − k) C(r, k).
+    fn stencil(order: usize) -> Vec<f64> {
+        (0..order).fold(vec![1.0], |weights, _| {
+            let mut next = vec![0.0; weights.len() + 1];
+            for (k, w) in weights.iter().enumerate() {
+                next[k] -= w;
+                next[k + 1] += w;
+            }
+            next
+        })
+    }
+
+    /// Half the penalty of θ, and its slope taken off `slope`.
+    fn apply(self, theta: &[f64], slope: Option<&mut [f64]>) -> f64 {
+        if self.weight <= 0.0 {
+            return 0.0;
+        }
+        let stencil = Self::stencil(self.order);
+        let differences = theta
+            .windows(self.order + 1)
+            .map(|part| part.iter().zip(&stencil).map(|(t, w)| t * w).sum::<f64>());
+        let Some(slope) = slope else {
+            return 0.5 * self.weight * differences.map(|d| d * d).sum::<f64>();
+        };
+        let mut half = 0.0;
+        for (start, difference) in differences.enumerate() {
+            half += 0.5 * self.weight * difference * difference;
+            for (s, w) in slope[start..].iter_mut().zip(&stencil) {
+                *s -= self.weight * difference * w;
+            }
+        }
+        half
+    }
+
+    /// Adds the penalty's matrix.
+    pub(crate) fn add_to(self, matrix: &mut Symmetric) {
+        if self.weight <= 0.0 {
+            return;
+        }
+        let stencil = Self::stencil(self.order);
+        for start in 0..matrix.size().saturating_sub(self.order) {
+            for (a, wa) in stencil.iter().enumerate() {
+                for (b, wb) in stencil[..=a].iter().enumerate() {
+                    *matrix.entry(start + a, start + b) += self.weight * wa * wb;
+                }
+            }
+        }
+    }
+
+    /// ln of the product of the positive eigenvalues of the penalty's matrix at weight 1: that of the differences' Gram matrix.
+    pub(crate) fn log_pseudo_determinant(nodes: usize, order: usize) -> f64 {
+        let stencil = Self::stencil(order);
+        let mut gram = Symmetric::zeros(nodes.saturating_sub(order));
+        for i in 0..gram.size() {
+            for j in i.saturating_sub(order)..=i {
+                *gram.entry(i, j) = stencil[i - j..].iter().zip(&stencil).map(|(a, b)| a * b).sum();
+            }
+        }
+        gram.factorise();
+        gram.log_determinant()
+    }
+}
+
+/// What scoring works on, kept between fits.
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace {
+    expected: Vec<f64>,
+    densities: Vec<f64>,
+    scaled: Vec<f64>,
+    pub(crate) information: Symmetric,
+}
+
+impl Workspace {
+    pub(crate) fn new(design: &Design) -> Self {
+        Self {
+            expected: vec![0.0; design.rows],
+            densities: vec![0.0; design.nodes()],
+            scaled: vec![0.0; design.rows * design.nodes()],
+            information: Symmetric::zeros(design.nodes()),
+        }
+    }
+}
+
+/// The place of the largest penalised likelihood.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Peak {
+    /// ln of the density of each node.
+    pub(crate) theta: Vec<f64>,
+    /// Log-likelihood there.
+    pub(crate) likelihood: f64,
+    /// Log-likelihood less half the penalty.
+    pub(crate) value: f64,
+    /// ln of the determinant of the information with the penalty.
+    pub(crate) log_determinant: f64,
+    /// Steps.
+    pub(crate) iterations: usize,
+    /// Whether the last step promised less than was asked for.
+    pub(crate) converged: bool,
+}
+
+const MOST_STEPS: usize = 60;
+/// Keeps logarithms of densities that no count and no neighbour holds from running away: a standard deviation of 10³.
+const RIDGE: f64 = 1e-6;
+/// No logarithm moves farther than this in a step.
+const LONGEST_STEP: f64 = 3.0;
+
+/// Maximises ℓ(θ) − penalty / 2, ℓ = Σ n ln μ − μ, μ = K exp θ, by Fisher scoring with step halving.
+///
+/// # Formula
+///
+/// ```text
+/// (Wᵀ diag(1/μ) W + λ DᵀD) δ = Wᵀ (n/μ − 1) − λ DᵀD θ,   W = K diag(exp θ)
+/// ```
+///
+/// A step takes nodes² × rows multiplications.
+pub(crate) fn climb(
+    design: &Design,
+    counts: &[f64],
+    penalty: Penalty,
+    start: &[f64],
+    last_gain: f64,
+    room: &mut Workspace,
+) -> Peak {
+    let mut theta = start.to_vec();
+    let mut step = vec![0.0; theta.len()];
+    let mut trial = theta.clone();
+    let (mut likelihood, mut value) = ascend(design, counts, penalty, &theta, room);
+    let (mut iterations, mut log_determinant, mut converged) = (0, 0.0, false);
+    while iterations < MOST_STEPS && !converged {
+        iterations += 1;
+        score(design, counts, penalty, &theta, &mut step, room);
+        if !room.information.factorise() {
+            break;
+        }
+        log_determinant = room.information.log_determinant();
+        trial.copy_from_slice(&step);
+        room.information.solve(&mut step);
+        let gain = dot(&trial, &step);
+        converged = gain < last_gain;
+        let longest = step.iter().fold(0.0_f64, |longest, s| longest.max(s.abs()));
+        let mut length = (LONGEST_STEP / longest).min(1.0);
+        let risen = (0..12).any(|_| {
+            for ((trial, t), s) in trial.iter_mut().zip(&theta).zip(&step) {
+                *trial = t + length * s;
+            }
+            length *= 0.5;
+            let (trial_likelihood, trial_value) = ascend(design, counts, penalty, &trial, room);
+            let risen = trial_value >= value;
+            if risen {
+                (likelihood, value) = (trial_likelihood, trial_value);
+            }
+            risen
+        });
+        if !risen {
+            // Rounding: nothing is higher than this.
+            converged = true;
+            break;
+        }
+        theta.copy_from_slice(&trial);
+    }
+    Peak {
+        theta,
+        likelihood,
+        value,
+        log_determinant,
+        iterations,
+        converged,
+    }
+}
+
+impl Peak {
+    /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so what is left is far less.
+    pub(crate) const LAST_GAIN: f64 = 0.3;
+}
+
+/// Log-likelihood and penalised log-likelihood at θ, with densities and expected counts left in `room`.
+fn ascend(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> (f64, f64) {
+    for (density, t) in room.densities.iter_mut().zip(theta) {
+        *density = t.exp();
+    }
+    design.refold(&room.densities, &mut room.expected);
+    let likelihood = log_likelihood(counts, &room.expected);
+    (likelihood, likelihood - penalty.apply(theta, None))
+}
+
+/// Slope of the penalised likelihood into `slope`, information into `room`.
+fn score(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], slope: &mut [f64], room: &mut Workspace) {
+    let Workspace {
+        expected,
+        densities,
+        scaled,
+        information,
+    } = room;
+    let rows = design.rows;
+    // 1/√μ for the information, n/μ − 1 for the slope.
+    let roots: Vec<(f64, f64)> = expected
+        .iter()
+        .zip(counts)
+        .map(|(&mu, &n)| {
+            if mu > 0.0 {
+                (1.0 / mu.sqrt(), n / mu - 1.0)
+            } else {
+                (0.0, 0.0)
+            }
+        })
+        .collect();
+    for (node, slope) in slope.iter_mut().enumerate() {
+        let (from, column) = design.column(node);
+        let scaled = &mut scaled[node * rows + from..node * rows + from + column.len()];
+        let mut sum = 0.0;
+        for ((scaled, k), (root, excess)) in scaled.iter_mut().zip(column).zip(&roots[from..]) {
+            let weight = k * densities[node];
+            *scaled = weight * root;
+            sum += weight * excess;
+        }
+        *slope = sum;
+    }
+    for i in 0..design.nodes() {
+        let (from_i, to_i) = design.spans[i];
+        for j in 0..=i {
+            let (from_j, to_j) = design.spans[j];
+            let from = from_i.max(from_j);
+            let to = to_i.min(to_j).max(from);
+            *information.entry(i, j) = dot(
+                &scaled[i * rows + from..i * rows + to],
+                &scaled[j * rows + from..j * rows + to],
+            );
+        }
+        *information.entry(i, i) += RIDGE;
+    }
+    penalty.apply(theta, Some(slope));
+    penalty.add_to(information);
+}

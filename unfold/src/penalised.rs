@@ -1,0 +1,142 @@
+//! The smooth estimate: logarithms of densities with a penalty on their roughness, how heavy is for the counts to say.
+//!
+//! The penalty of order r, λ/2 Σ (Δʳ θ)², is the logarithm of a Gaussian prior of θ; the evidence of λ and r is the integral of likelihood times
+//! prior over θ, by Laplace's approximation
+//!
+//! ```text
+//! ln p(n | λ, r) ≈ ℓ(θ̂) − λ/2 |Dθ̂|² + (m − r)/2 ln λ + ½ ln |DDᵀ| − ½ ln |I + λ DᵀD| − r ln(σ √m)
+//! ```
+//!
+//! where the last term is the price of the r directions the penalty leaves free, polynomials below degree r, each with a standard deviation of σ = 2 a node.
+//! Fits along λ = 10^k, k falling, and r = 1, 2, 3 are averaged with their evidence as weights (empirical Bayes with nothing chosen by hand).
+
+use crate::log_densities::{Design, Peak, Penalty, Workspace, climb};
+
+/// Spread of the logarithm of densities along the polynomials a penalty leaves free.
+const FREE_SPREAD: f64 = 1.0;
+/// ln of the weight the path begins at, per order, for [`REFERENCE_NODES`] nodes: practically a polynomial.
+const HEAVIEST: [f64; 3] = [5.0, 6.0, 7.0];
+const REFERENCE_NODES: f64 = 40.0;
+/// Weights fall by this factor, in powers of ten.
+const DECADES: f64 = 1.0;
+const MOST_WEIGHTS: usize = 12;
+/// The path ends where the evidence is lower than the best by this: 1/400 of its weight.
+const ENOUGH: f64 = 6.0;
+
+/// The fits of all orders and weights that the counts bear, and their mean.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SmoothFit {
+    /// Densities of the nodes, averaged by evidence.
+    pub(crate) densities: Vec<f64>,
+    /// ln of the evidence, averaged over the weights tried.
+    pub(crate) evidence: f64,
+    /// The single best penalty.
+    pub(crate) penalty: Penalty,
+    /// The best weight at order 2, where intervals are drawn, and the fit there.
+    pub(crate) second_order: (Penalty, Vec<f64>),
+    /// Trace of information over information with penalty, at the best: parameters in effect.
+    pub(crate) effective_parameters: f64,
+    pub(crate) iterations: usize,
+    pub(crate) converged: bool,
+}
+
+/// Fits of one order and weight.
+struct Step {
+    penalty: Penalty,
+    peak: Peak,
+    evidence: f64,
+}
+
+/// Fits counts that are not all zero.
+pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
+    let nodes = design.nodes();
+    let mut room = Workspace::new(design);
+    let mut steps: Vec<Step> = Vec::new();
+    for order in 1..=3.min(nodes.saturating_sub(1)).max(1) {
+        steps.extend(path(design, counts, order, &mut room));
+    }
+    let top = steps.iter().map(|step| step.evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut densities = vec![0.0; nodes];
+    let mut whole = 0.0;
+    for step in &steps {
+        let weight = (step.evidence - top).exp();
+        whole += weight;
+        for (density, t) in densities.iter_mut().zip(&step.peak.theta) {
+            *density += weight * t.exp();
+        }
+    }
+    densities.iter_mut().for_each(|density| *density /= whole);
+    let best = |order: Option<usize>| {
+        steps
+            .iter()
+            .filter(|step| order.is_none_or(|order| step.penalty.order == order))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    };
+    let found = best(None).map(|step| (step.penalty, step.peak.theta.clone()));
+    let (penalty, theta) = found.unwrap_or((Penalty::NONE, vec![0.0; nodes]));
+    let second_order = best(Some(2)).map_or((penalty, theta.clone()), |step| (step.penalty, step.peak.theta.clone()));
+    SmoothFit {
+        densities,
+        evidence: top + whole.ln() - (steps.len() as f64).ln(),
+        effective_parameters: effective_parameters(design, counts, penalty, &theta, &mut room),
+        penalty,
+        second_order,
+        iterations: steps.iter().map(|step| step.peak.iterations).sum(),
+        converged: steps.iter().all(|step| step.peak.converged),
+    }
+}
+
+/// Fits from the heaviest weight down, each from where the last one ended, until the evidence is lost.
+fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> Vec<Step> {
+    let nodes = design.nodes();
+    let rank = nodes.saturating_sub(order) as f64;
+    let constant =
+        0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (FREE_SPREAD * (nodes as f64).sqrt()).ln();
+    // The same roughness in finer nodes: differences of order r shrink with r powers of the spacing.
+    let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
+    let mut start = vec![level(design, counts).ln(); nodes];
+    let mut steps: Vec<Step> = Vec::new();
+    let mut best = f64::NEG_INFINITY;
+    for k in 0..MOST_WEIGHTS {
+        let weight = 10_f64.powf(HEAVIEST[order - 1] + finer - DECADES * k as f64);
+        let penalty = Penalty { order, weight };
+        let peak = climb(design, counts, penalty, &start, Peak::LAST_GAIN, room);
+        start.clone_from(&peak.theta);
+        let evidence = peak.value + 0.5 * (rank * weight.ln() - peak.log_determinant) + constant;
+        best = best.max(evidence);
+        steps.push(Step {
+            penalty,
+            peak,
+            evidence,
+        });
+        if evidence < best - ENOUGH {
+            break;
+        }
+    }
+    steps
+}
+
+/// The density at which all nodes alike would show as many profiles as there are.
+pub(crate) fn level(design: &Design, counts: &[f64]) -> f64 {
+    let shown: f64 = (0..design.nodes()).map(|node| design.column_sum(node)).sum();
+    counts.iter().sum::<f64>() / shown
+}
+
+/// tr (I + λP)⁻¹ I.
+fn effective_parameters(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> f64 {
+    let nodes = design.nodes();
+    // One more step leaves the factor of I + λP at θ in the workspace; I itself is that less λP.
+    let _ = climb(design, counts, penalty, theta, f64::INFINITY, room);
+    let mut rough = crate::cholesky::Symmetric::zeros(nodes);
+    penalty.add_to(&mut rough);
+    let mut trace = nodes as f64;
+    let mut column = vec![0.0; nodes];
+    for i in 0..nodes {
+        for (k, value) in column.iter_mut().enumerate() {
+            *value = *rough.entry(i.max(k), i.min(k));
+        }
+        room.information.solve(&mut column);
+        trace -= column[i];
+    }
+    trace
+}

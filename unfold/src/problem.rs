@@ -1,0 +1,149 @@
+//! The part of counts and kernel above the threshold, on the bins of the kernel and on those that are reported.
+
+use crate::log_densities::Design;
+use crate::{Bootstrap, Kernel, ProfileCounts, UnfoldError, UnfoldOptions};
+use nalgebra::{DMatrix, DVector};
+
+/// Counts that are Poisson's, and what particles of each bin show of them.
+pub(crate) struct Problem {
+    /// Expected counts of one particle per unit volume in each kept bin of the kernel: kernel × area / dispersion.
+    pub(crate) fine: DMatrix<f64>,
+    /// The same by reported bin, with particles spread over its kept bins as the kernel has it.
+    pub(crate) coarse: DMatrix<f64>,
+    /// `fine` for densities relative to the width of a bin, made when it is first needed.
+    pub(crate) design: Design,
+    /// Width of each kept bin over the mean width.
+    pub(crate) widths: Vec<f64>,
+    /// Counts above the threshold over their dispersion.
+    pub(crate) counts: Vec<f64>,
+    /// Index of each kept bin among the kernel's.
+    pub(crate) columns: Vec<usize>,
+    /// Reported bin of each column of `coarse`.
+    pub(crate) reported: Vec<usize>,
+    /// Column of `coarse` that each kept bin belongs to, and its share of that one's width.
+    pub(crate) parts: Vec<(usize, f64)>,
+    pub(crate) first_row: usize,
+    pub(crate) threshold: f64,
+}
+
+impl Problem {
+    pub(crate) fn new(counts: &ProfileCounts, kernel: &Kernel, options: &UnfoldOptions) -> Result<Self, UnfoldError> {
+        let matrix = kernel.matrix();
+        if counts.counts().len() != matrix.nrows() {
+            return Err(UnfoldError::Rows {
+                counts: counts.counts().len(),
+                rows: matrix.nrows(),
+            });
+        }
+        check(options)?;
+        let asked = options.min_size.unwrap_or(0.0);
+        if !(asked.is_finite() && asked >= 0.0) {
+            return Err(UnfoldError::Threshold(asked));
+        }
+        let edges = counts.edges();
+        // A threshold that is an edge but for rounding is that edge.
+        let first_row = edges.partition_point(|&edge| edge < asked * (1.0 - 1e-12));
+        let kept = counts.counts().get(first_row..).unwrap_or(&[]);
+        if kept.iter().sum::<f64>() <= 0.0 {
+            return Err(UnfoldError::Threshold(asked));
+        }
+        let rows = matrix.rows(first_row, kept.len());
+        let columns: Vec<usize> = (0..matrix.ncols()).filter(|&j| rows.column(j).sum() > 0.0).collect();
+        if let Some(bin) = (0..kept.len()).find(|&i| kept[i] > 0.0 && rows.row(i).sum() <= 0.0) {
+            return Err(UnfoldError::Unexplained { bin: bin + first_row });
+        }
+        let scale = counts.area() / counts.dispersion();
+        let fine = rows.select_columns(&columns) * scale;
+        let sizes = kernel.sizes();
+        let width = |j: usize| sizes.edges()[j + 1] - sizes.edges()[j];
+        let mean_width = columns.iter().map(|&j| width(j)).sum::<f64>() / columns.len() as f64;
+        let widths: Vec<f64> = columns.iter().map(|&j| width(j) / mean_width).collect();
+        let groups = sizes.groups();
+        let mut reported: Vec<usize> = columns.iter().map(|&j| groups[j]).collect();
+        reported.dedup();
+        let place = |j: usize| reported.iter().position(|&group| group == groups[j]).unwrap_or(0);
+        let mut group_widths = vec![0.0; reported.len()];
+        for (&j, width) in columns.iter().zip(&widths) {
+            group_widths[place(j)] += width;
+        }
+        let parts: Vec<(usize, f64)> = columns
+            .iter()
+            .zip(&widths)
+            .map(|(&j, width)| (place(j), width / group_widths[place(j)]))
+            .collect();
+        let mut coarse = DMatrix::zeros(kept.len(), reported.len());
+        for (k, &(group, share)) in parts.iter().enumerate() {
+            let mut column = coarse.column_mut(group);
+            column += fine.column(k) * share;
+        }
+        let mut relative = fine.clone();
+        for (mut column, &width) in relative.column_iter_mut().zip(&widths) {
+            column *= width;
+        }
+        Ok(Self {
+            design: Design::new(&relative),
+            fine,
+            coarse,
+            widths,
+            counts: kept.iter().map(|count| count / counts.dispersion()).collect(),
+            columns,
+            reported,
+            parts,
+            first_row,
+            threshold: edges[first_row],
+        })
+    }
+
+    /// Densities of the kept bins from those of the reported ones.
+    pub(crate) fn spread(&self, coarse: &[f64]) -> Vec<f64> {
+        self.parts.iter().map(|&(group, share)| coarse[group] * share).collect()
+    }
+
+    /// Densities of the reported bins from those of the kept ones.
+    pub(crate) fn gather(&self, fine: &[f64]) -> Vec<f64> {
+        let mut coarse = vec![0.0; self.reported.len()];
+        for (&(group, _), density) in self.parts.iter().zip(fine) {
+            coarse[group] += density;
+        }
+        coarse
+    }
+
+    /// Densities of the kept bins from logarithms of densities relative to their widths.
+    pub(crate) fn with_logarithms(&self, theta: &[f64]) -> Vec<f64> {
+        theta
+            .iter()
+            .zip(&self.widths)
+            .map(|(t, width)| t.exp() * width)
+            .collect()
+    }
+
+    /// Expected counts.
+    pub(crate) fn refold(&self, fine: &[f64]) -> Vec<f64> {
+        let expected = &self.fine * DVector::from_column_slice(fine);
+        expected.iter().copied().collect()
+    }
+
+    /// Densities of all bins of the kernel; zero where there is none.
+    pub(crate) fn widen(&self, fine: &[f64], bins: usize) -> Vec<f64> {
+        let mut wide = vec![0.0; bins];
+        for (&j, &density) in self.columns.iter().zip(fine) {
+            wide[j] = density;
+        }
+        wide
+    }
+}
+
+fn check(options: &UnfoldOptions) -> Result<(), UnfoldError> {
+    if let Some(bootstrap @ Bootstrap { replicates, level, .. }) = options.bootstrap
+        && (bootstrap.replicates < 2 || !(level > 0.0 && level < 1.0))
+    {
+        return Err(UnfoldError::Bootstrap { replicates, level });
+    }
+    if options.tolerance.is_nan() || options.tolerance <= 0.0 {
+        return Err(UnfoldError::Tolerance(options.tolerance));
+    }
+    if !(0.0..=0.25).contains(&options.smoothing) {
+        return Err(UnfoldError::Smoothing(options.smoothing));
+    }
+    Ok(())
+}

@@ -15,6 +15,8 @@ pub struct TableProfile {
     pub category: Option<u8>,
     /// What it counts for.
     pub weight: f64,
+    /// The slice it is on, if the table tells.
+    pub slice: Option<usize>,
 }
 
 /// Why a table of profiles cannot be read.
@@ -76,7 +78,7 @@ pub fn read_profiles(path: &Path) -> Result<Vec<TableProfile>, TableError> {
             .position(|header| header.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
     };
     let (size, area) = (column("size"), column("area"));
-    let (kind, category, weight) = (column("type"), column("category"), column("weight"));
+    let (kind, category, weight, slice) = (column("type"), column("category"), column("weight"), column("slice"));
     if size.or(area).is_none() {
         let found: Vec<_> = headers.iter().take(8).collect();
         return Err(TableError::NoSize {
@@ -124,6 +126,12 @@ pub fn read_profiles(path: &Path) -> Result<Vec<TableProfile>, TableError> {
                 (None, None) => return Err(TableError::NoSize { found: String::new() }),
             },
             kind: kind.map(|column| index(column, "type").map(usize::from)).transpose()?,
+            slice: slice
+                .map(|column| {
+                    let number = text(column).parse();
+                    number.map_err(|_| wrong(format!("`{}` is no slice: a whole number from 0", text(column))))
+                })
+                .transpose()?,
             category: category.map(|column| index(column, "category")).transpose()?,
             weight: match weight.map(number).transpose()? {
                 None => 1.0,

@@ -42,6 +42,26 @@ pub fn count(text: &str) -> Result<usize, String> {
     }
 }
 
+/// A number of bins, from 1 to 1000, or `auto`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BinCount {
+    /// So many.
+    Number(usize),
+    /// As many as the profiles bear.
+    Auto,
+}
+
+impl FromStr for BinCount {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.trim() == "auto" {
+            return Ok(Self::Auto);
+        }
+        bins(text).map(Self::Number)
+    }
+}
+
 /// A number of bins, from 1 to 1000.
 pub fn bins(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {

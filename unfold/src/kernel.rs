@@ -63,6 +63,9 @@ pub enum KernelError {
     /// The body's surface is not a positive number.
     #[error("the body's surface area at size 1 is {0}: it must be positive and finite")]
     Surface(f64),
+    /// A capping angle that is none.
+    #[error("the capping angle is {0}: it must lie from 0 to below a right angle, in radians")]
+    CappingAngle(f64),
     /// Fractions that are none, or as many as there are kernels.
     #[error("{fractions} fractions for {kernels} kernels: give one a kernel, finite and not negative, not all zero")]
     Fractions {

@@ -66,12 +66,15 @@
 //! total is wrong).
 
 mod bootstrap;
+mod capping;
 mod cholesky;
+mod edge_rule;
 mod estimator;
 mod expectation_maximisation;
 mod finding;
 mod inverse;
 mod kernel;
+mod largest_size;
 mod log_densities;
 mod nnls;
 mod normal;
@@ -80,18 +83,25 @@ mod particle_types;
 mod penalised;
 mod problem;
 mod profile_counts;
+mod profile_likelihood;
 mod size_bins;
 mod size_distribution;
 mod sparse;
 mod unfolding;
+mod unknown_fractions;
 
+pub use capping::capped_kernel;
+pub use edge_rule::{BoundingBox, EdgeRule, edge_weights};
 pub use finding::Finding;
 pub use kernel::{Kernel, KernelError, mix_kernels};
+pub use largest_size::{LargestSize, largest_size};
 pub use options::{Bootstrap, Method, Resampling, UnfoldOptions};
 pub use particle_types::{TypesUnfolding, unfold_types, unfold_types_with_progress};
 pub use profile_counts::{ProfileCounts, ProfilesError};
+pub use profile_likelihood::{LikelyParameter, likely_parameter};
 pub use size_bins::{EdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges};
 pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
 pub use unfolding::{
     CrossCheck, Estimate, Interval, PenaltyUsed, Progress, UnfoldError, Unfolding, unfold, unfold_with_progress,
 };
+pub use unknown_fractions::{Fractions, unknown_fractions};

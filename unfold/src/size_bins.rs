@@ -79,7 +79,8 @@ pub fn geometric_edges(smallest: f64, largest: f64, bins: usize) -> Vec<f64> {
 /// ```
 #[must_use]
 pub fn phi_edges(smallest: f64, largest: f64, step: f64) -> Vec<f64> {
-    if !(smallest > 0.0 && largest.is_finite() && step > 0.0) {
+    let lengths = smallest > 0.0 && smallest.is_finite() && largest > 0.0 && largest.is_finite();
+    if !(lengths && step > 0.0 && (largest / smallest).log2().abs() < 1000.0 * step) {
         return vec![0.0, largest];
     }
     let from = (smallest.log2() / step + 1e-9).floor();

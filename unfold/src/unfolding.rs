@@ -7,7 +7,7 @@ use crate::kernel::condition_number;
 use crate::problem::Problem;
 use crate::profile_counts::mean_profile_area;
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
-use crate::{EdgesError, Kernel, Method, ProfileCounts, UnfoldOptions};
+use crate::{EdgesError, Kernel, KernelError, Method, ProfileCounts, UnfoldOptions};
 use std::ops::ControlFlow;
 
 /// Called with the share done, from any thread; `Break` cancels.
@@ -74,6 +74,34 @@ pub enum UnfoldError {
         /// Which, from 0.
         index: usize,
     },
+    /// A range of a parameter that is none, or holds no value that can explain the profiles.
+    #[error(
+        "the range {from} to {to} holds no value with which all profiles can be explained: it must be finite, rising, and reach high enough"
+    )]
+    Range {
+        /// Lower end.
+        from: f64,
+        /// Upper end.
+        to: f64,
+    },
+    /// Fractions of types that the counts do not tell.
+    #[error(
+        "the counts do not tell the fractions of the types: type {index} could be {:.0} to {:.0} % (condition number {condition_number:.0}); give the fractions, or label the profiles",
+        100.0 * .lower, 100.0 * .upper
+    )]
+    FractionsUnknowable {
+        /// The type, from 0.
+        index: usize,
+        /// Lower end of its interval.
+        lower: f64,
+        /// Upper end of its interval.
+        upper: f64,
+        /// How alike the profiles of the types are.
+        condition_number: f64,
+    },
+    /// A kernel that is none.
+    #[error(transparent)]
+    Kernel(#[from] KernelError),
     /// Edges that make no bins.
     #[error(transparent)]
     Edges(#[from] EdgesError),
@@ -172,6 +200,30 @@ pub struct Unfolding {
     pub iterations: usize,
     /// Warnings.
     pub findings: Vec<Finding>,
+}
+
+impl Unfolding {
+    /// Values of the profile bins, `observed` or `refolded`, summed to the bins between `edges`, which should be edges of theirs too: a profile bin counts
+    /// where its middle lies.
+    #[must_use]
+    pub fn profiles_in(&self, edges: &[f64], values: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; edges.len().saturating_sub(1)];
+        for (bin, value) in self.profile_edges.windows(2).zip(values) {
+            let middle = 0.5 * (bin[0] + bin[1]);
+            let place = edges.partition_point(|&edge| edge < middle);
+            if place > 0 && place < edges.len() {
+                sums[place - 1] += value;
+            }
+        }
+        sums
+    }
+
+    /// Sums the profile bins to those between `edges`, for histograms; the fit and its deviance stay what they are.
+    pub fn rebin_profiles(&mut self, edges: &[f64]) {
+        self.observed = self.profiles_in(edges, &self.observed);
+        self.refolded = self.profiles_in(edges, &self.refolded);
+        self.profile_edges = edges.to_vec();
+    }
 }
 
 /// Unfolds profile counts with the kernel of their particles: eq. (2) or (5) solved for N_V.

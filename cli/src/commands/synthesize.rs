@@ -27,7 +27,7 @@ use crate::numbers::{counted, percent, significant};
 use crate::outputs::{OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Stages, go_on};
 use crate::report::{self, Pictures, report_input};
-use crate::values::{ShapeShare, count, positive, share};
+use crate::values::{BinCount, ShapeShare, count, positive, share};
 
 /// From a photograph of a cut to the solid it came from, and a report that tells whether to trust it
 ///
@@ -148,7 +148,11 @@ impl Synthesize {
             pixel: everywhere.scale,
             segment: self.segment.options(seed),
             densities: DensityOptions {
-                bins: unfold.bins.unwrap_or(BINS),
+                bins: match unfold.bins {
+                    None => BINS,
+                    Some(BinCount::Number(bins)) => bins,
+                    Some(BinCount::Auto) => 0,
+                },
                 edges,
                 max_size: unfold.max_size,
                 sizes: unfold.sizes(),

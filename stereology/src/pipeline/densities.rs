@@ -4,8 +4,8 @@ use crate::pipeline::association::{Association, association};
 use crate::pipeline::{ParticleTypes, ParticleTypesError, Warning};
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
-    Finding, Kernel, Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, divided_edges,
-    equal_edges, unfold, unfold_with_progress,
+    Finding, Kernel, Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, automatic_bins,
+    divided_edges, equal_edges, unfold, unfold_with_progress,
 };
 
 /// What was measured on the photograph: one entry a profile in each.
@@ -17,6 +17,8 @@ pub struct MeasuredProfiles {
     pub weights: Vec<f64>,
     /// Colour categories, from 0.
     pub categories: Vec<u8>,
+    /// Slices they are on, from 0, one a profile; empty if there is one slice, or it is not known.
+    pub slices: Vec<usize>,
     /// Area examined; length squared.
     pub area: f64,
     /// Profiles up to this size are lost.
@@ -26,7 +28,7 @@ pub struct MeasuredProfiles {
 /// How to unfold them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DensityOptions {
-    /// Size bins between 0 and the largest size.
+    /// Size bins between 0 and the largest size; 0: as many as the profiles bear ([`automatic_bins`]).
     pub bins: usize,
     /// Edges of the size bins instead.
     pub edges: Option<Vec<f64>>,
@@ -103,7 +105,7 @@ pub enum DensityError {
 ///
 /// // Cuts through spheres of diameter 10, at evenly spread depths: N_A = D N_V.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
-/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, min_size: 0.0, sizes };
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], slices: vec![], area: 1e5, min_size: 0.0, sizes };
 /// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
 /// let found = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// assert!((found.all.total.value / (300.0 / 1e5 / 10.0) - 1.0).abs() < 0.15);
@@ -123,25 +125,65 @@ pub fn particle_densities(
     let largest = places.iter().map(|&i| profiles.sizes[i]).fold(0.0, f64::max);
     let edges = match &options.edges {
         Some(edges) => edges.clone(),
-        None => equal_edges(options.max_size.unwrap_or(largest), options.bins),
+        None => {
+            let largest = options.max_size.unwrap_or(largest);
+            let counted: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
+            let bins = match options.bins {
+                0 => automatic_bins(&counted, largest, MOST_BINS),
+                bins => bins,
+            };
+            equal_edges(largest, bins)
+        }
     };
     let threshold = settled_threshold(&edges, options.unfold.min_size.unwrap_or(profiles.min_size));
     let unfolding = UnfoldOptions {
         min_size: (threshold > 0.0).then_some(threshold),
         ..options.unfold
     };
-    let UnfoldingBins {
-        profile_edges,
-        size_edges,
-    } = UnfoldingBins::new(&edges, threshold, options.unfold.method, options.sizes);
-    let kernel = reported(types.kernel(&profile_edges, &size_edges, options.sizes)?, &edges)?;
+    let fit_bins = UnfoldingBins::new(&edges, threshold, options.unfold.method, options.sizes);
+    let kernel = reported(
+        types.kernel(&fit_bins.profile_edges, &fit_bins.size_edges, options.sizes)?,
+        &edges,
+    )?;
     let unfold_these = |places: &[usize], options: &UnfoldOptions| {
         let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
         let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
-        let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), &profile_edges, profiles.area)?;
+        let counts = if profiles.slices.is_empty() {
+            ProfileCounts::from_sizes(&sizes, Some(&weights), &fit_bins.profile_edges, profiles.area)?
+        } else {
+            let slices: Vec<usize> = places.iter().map(|&i| profiles.slices[i]).collect();
+            ProfileCounts::from_slices(&sizes, Some(&weights), &slices, &fit_bins.profile_edges, profiles.area)?
+        };
         Ok::<_, DensityError>(unfold_with_progress(&counts, &kernel, options, progress)?)
     };
-    let all = unfold_these(&places, &unfolding)?;
+    let mut all = unfold_these(&places, &unfolding)?;
+    // What the findings would be in fewer bins, to name the number that cures them.
+    let in_fewer = |bins: usize| -> Vec<Finding> {
+        let edges = equal_edges(edges[edges.len() - 1], bins);
+        let bins = UnfoldingBins::new(&edges, threshold, unfolding.method, options.sizes);
+        let found = || {
+            let kernel = types.kernel(&bins.profile_edges, &bins.size_edges, options.sizes)?;
+            let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
+            let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
+            let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), &bins.profile_edges, profiles.area)?;
+            let options = UnfoldOptions {
+                bootstrap: None,
+                ..unfolding
+            };
+            Ok::<_, DensityError>(unfold(&counts, &reported(kernel, &edges)?, &options)?.findings)
+        };
+        found().unwrap_or_default()
+    };
+    let bins = edges.len() - 1;
+    if unfolding.method != Method::Paper {
+        all.rebin_profiles(&histogram_edges(&edges, threshold));
+    }
+    let profile_edges = all.profile_edges.clone();
+    all.findings = all
+        .findings
+        .iter()
+        .map(|finding| finding.with_cure(bins, &in_fewer))
+        .collect();
 
     let of_category = |category: usize| -> Vec<usize> {
         places
@@ -187,6 +229,11 @@ pub fn particle_densities(
     })
 }
 
+/// The reported bins cut in halves, with an edge at the threshold: as fine as a histogram of some hundred profiles can be.
+fn histogram_edges(edges: &[f64], threshold: f64) -> Vec<f64> {
+    divided_edges(edges, 2 * (edges.len() - 1), threshold)
+}
+
 /// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
 /// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,6 +246,8 @@ pub struct UnfoldingBins {
 
 /// A hundred profile bins or more lose nothing that shows in the densities.
 const PROFILE_BINS: usize = 100;
+/// More bins than this are not chosen automatically.
+const MOST_BINS: usize = 50;
 /// Forty size bins or more make the smooth estimate as smooth as can be seen.
 const SIZE_BINS: usize = 40;
 
@@ -224,7 +273,9 @@ impl UnfoldingBins {
 
 /// The kernel with its bins summed to those between `edges`.
 pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityError> {
-    kernel.reported_in(edges).map_err(|error| DensityError::Unfold(UnfoldError::Edges(error)))
+    kernel
+        .reported_in(edges)
+        .map_err(|error| DensityError::Unfold(UnfoldError::Edges(error)))
 }
 
 /// The threshold, raised to the upper edge of its bin if that edge is less than [`SEEN`] times the threshold: a plane that cuts a sphere of diameter D shows it

@@ -16,7 +16,9 @@ mod wasserstein;
 
 pub use association::{Association, SIGNIFICANT, association};
 pub use colouring::particle_colours;
-pub use densities::{DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, particle_densities};
+pub use densities::{
+    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, UnfoldingBins, particle_densities,
+};
 pub use fine_details::{FineDetails, fine_details};
 pub use particle_types::{ParticleType, ParticleTypes, ParticleTypesError};
 pub use population::{Extent, Population, PopulationFailure, population};

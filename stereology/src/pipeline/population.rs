@@ -183,12 +183,12 @@ fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
             });
         }
         let seen = lower.max(all.threshold.min(upper));
-        let share = (upper - seen) / (upper - lower);
-        (share > 0.0).then_some(Bin {
+        // The densities of that bin are of the particles above the threshold only.
+        (seen < upper).then_some(Bin {
             index,
             lower: seen,
             upper,
-            number_density: number_density * share,
+            number_density,
         })
     };
     (0..all.number_density.len()).filter_map(bin).collect()

@@ -287,6 +287,7 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         sizes: profiles.iter().map(|profile| profile.size * pixel).collect(),
         weights: profiles.iter().map(|profile| profile.weight).collect(),
         categories: profiles.iter().map(|profile| profile.category).collect(),
+        slices: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
         // A profile of exactly the least area was kept: the threshold lies just below it.
         min_size: segmentation.min_size * pixel * (1.0 - 1e-9),

@@ -72,6 +72,12 @@ impl Design {
 
     /// Diameters of the profiles on ten equally spaced slices of a box of spheres, of random number, sizes and heights.
     pub(crate) fn profiles(&self, seed: u64) -> Vec<f64> {
+        let profiles = self.profiles_with_sizes(seed).into_iter();
+        profiles.map(|(profile, _)| profile).collect()
+    }
+
+    /// The same, each with the diameter of its sphere.
+    pub(crate) fn profiles_with_sizes(&self, seed: u64) -> Vec<(f64, f64)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let count = Poisson::new(self.number_density * SIDE.powi(3))
             .unwrap()
@@ -90,7 +96,7 @@ impl Design {
                 let apart = (height - (slice as f64 + shift) * SIDE / SLICES as f64).abs();
                 let apart = apart.min(SIDE - apart);
                 if 2.0 * apart < diameter {
-                    profiles.push((diameter * diameter - 4.0 * apart * apart).sqrt());
+                    profiles.push(((diameter * diameter - 4.0 * apart * apart).sqrt(), diameter));
                 }
             }
         }

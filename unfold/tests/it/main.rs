@@ -9,6 +9,7 @@
 mod bad_input;
 mod experiment;
 mod figure_7;
+mod incomplete;
 mod intervals;
 mod round_trips;
 mod spheres;

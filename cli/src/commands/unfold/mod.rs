@@ -1,26 +1,30 @@
 //! `stereology unfold`: profiles per area -> particles per volume.
 
-use std::path::{Path, PathBuf};
+mod choices;
+mod figures;
 
-use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+use clap::Args;
 use serde_json::{Value, json};
 use stereology::files::DensityRows;
-use stereology::kmatrix::Sizes;
-use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, particle_densities};
 use stereology::unfold::{
-    self, Bootstrap, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, geometric_edges,
-    unfold_types_with_progress,
+    self, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, unfold_types_with_progress,
 };
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::{Explain, Failure, body};
+use crate::failure::{Explain, Failure};
 use crate::numbers::{percent, significant};
 use crate::outputs::check_file;
 use crate::profile_table::{TableProfile, read_profiles};
 use crate::progress::{Step, go_on};
-use crate::values::{Edges, ShapeShare, bins, count, positive, share, shares};
+use crate::values::positive;
 use crate::warnings::Warning;
+
+pub use choices::{Choices, Spacing, types};
+pub use figures::figures;
 
 /// From the sizes of the profiles on a cut to the number and sizes of the particles in the solid
 ///
@@ -52,188 +56,10 @@ pub struct Unfold {
     pub output: Option<PathBuf>,
 }
 
-/// Size bins if not given.
-const BINS: usize = 10;
-
-/// How to unfold.
-#[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Unfolding")]
-#[group(id = "unfold-choices")]
-pub struct Choices {
-    /// Number of size bins between 0 and the largest size [default: 10; 16 for synthesize, whose sections show the steps of coarser bins]
-    #[arg(long, value_name = "N", value_parser = bins, conflicts_with = "edges")]
-    pub bins: Option<usize>,
-    /// Edges of the size bins, instead of --bins
-    #[arg(long, value_name = "a,b,...")]
-    pub edges: Option<Edges>,
-    /// Bins of equal width, or of equal ratio
-    #[arg(long, value_enum, default_value_t = Spacing::Equal, conflicts_with = "edges")]
-    pub spacing: Spacing,
-    /// Shape of the particles and its share of them; may be repeated [default: sphere]
-    #[arg(long, value_name = "SHAPE[=F]")]
-    pub shape: Vec<ShapeShare>,
-    /// Largest particle size [default: the largest profile]
-    #[arg(long, value_name = "D", value_parser = positive, conflicts_with = "edges")]
-    pub max_size: Option<f64>,
-    /// Profiles up to this size are not observed: nothing is said about particles below it
-    #[arg(long, value_name = "T", value_parser = positive)]
-    pub min_size: Option<f64>,
-    /// How to solve
-    #[arg(long, value_enum, default_value_t = Method::Auto)]
-    pub method: Method,
-    /// Sizes spread over each bin, or all at its upper edge (the paper's) [default: integrated; with --method paper: upper-edge]
-    #[arg(long, value_enum)]
-    pub kernel: Option<Kernel>,
-    /// Bootstrap replicates for intervals [default: none; synthesize: 200]
-    #[arg(long, value_name = "B", value_parser = count)]
-    pub bootstrap: Option<usize>,
-    /// Nominal coverage of the intervals
-    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = share)]
-    pub level: f64,
-}
-
-/// How bins are spaced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Spacing {
-    /// Equal widths
-    Equal,
-    /// Equal ratios
-    Geometric,
-}
-
-/// How the densities are found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Method {
-    /// Chosen from the data
-    Auto,
-    /// Penalised likelihood (not available yet)
-    Penalised,
-    /// Expectation maximisation: positive by construction
-    Em,
-    /// Expectation maximisation with smoothing (not available yet)
-    Ems,
-    /// Least squares with densities not below zero
-    Nnls,
-    /// The paper's inverse of K; negative densities are set to zero and counted
-    Paper,
-}
-
-/// Where in its bin a particle's size lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Kernel {
-    /// Anywhere in the bin
-    Integrated,
-    /// At the bin's upper edge
-    UpperEdge,
-}
-
-impl Method {
-    /// The estimator; what is chosen automatically is `em`.
-    pub fn estimator(self) -> Result<unfold::Method, Failure> {
-        match self {
-            Self::Auto | Self::Em => Ok(unfold::Method::Em),
-            Self::Nnls => Ok(unfold::Method::Nnls),
-            Self::Paper => Ok(unfold::Method::Paper),
-            Self::Penalised => Err(Failure::not_available("--method penalised")),
-            Self::Ems => Err(Failure::not_available("--method ems")),
-        }
-    }
-}
-
-impl Choices {
-    /// Where in its bin a particle's size lies.
-    pub fn sizes(&self) -> Sizes {
-        match (self.kernel, self.method) {
-            (Some(Kernel::UpperEdge), _) | (None, Method::Paper) => Sizes::UpperEdge,
-            _ => Sizes::Integrated,
-        }
-    }
-
-    /// Name of the kernel.
-    pub fn kernel_name(&self) -> &'static str {
-        match self.sizes() {
-            Sizes::UpperEdge => "upper-edge",
-            Sizes::Integrated => "integrated",
-        }
-    }
-
-    /// The particle types; spheres if none are named.
-    pub fn types(&self) -> Result<ParticleTypes, Failure> {
-        types(&self.shape)
-    }
-
-    /// The estimator with its threshold and intervals; lengths of the options are multiplied by `scale`.
-    pub fn unfold_options(&self, scale: f64, seed: u64) -> Result<UnfoldOptions, Failure> {
-        let mut options = UnfoldOptions::default().with_method(self.method.estimator()?);
-        if let Some(min_size) = self.min_size {
-            options = options.with_min_size(min_size * scale);
-        }
-        if let Some(replicates) = self.bootstrap {
-            let mut bootstrap = Bootstrap {
-                replicates,
-                ..Bootstrap::default()
-            };
-            bootstrap.level = self.level;
-            bootstrap.seed = seed;
-            options = options.with_bootstrap(bootstrap);
-        }
-        Ok(options)
-    }
-
-    /// Edges of the size bins, for profiles of these sizes.
-    pub fn size_edges(&self, profiles: &[TableProfile], scale: f64) -> Result<Vec<f64>, Failure> {
-        if let Some(Edges(edges)) = &self.edges {
-            return Ok(edges.iter().map(|edge| edge * scale).collect());
-        }
-        let counted = || {
-            profiles
-                .iter()
-                .filter(|profile| profile.weight > 0.0)
-                .map(|profile| profile.size)
-        };
-        let largest = self
-            .max_size
-            .map_or_else(|| counted().fold(0.0, f64::max), |size| size * scale);
-        let count = self.bins.unwrap_or(BINS);
-        match self.spacing {
-            Spacing::Equal => Ok(equal_edges(largest, count)),
-            Spacing::Geometric => {
-                // The first bin is everything up to the smallest size that is seen.
-                let smallest = self
-                    .min_size
-                    .map_or_else(|| counted().fold(f64::INFINITY, f64::min), |size| size * scale);
-                if count < 2 || smallest.is_nan() || smallest >= largest {
-                    return Err(Failure::usage(
-                        "--spacing geometric needs two or more bins, and sizes that differ; give --min-size and --max-size, or --spacing equal",
-                    ));
-                }
-                Ok(geometric_edges(smallest, largest, count - 1))
-            }
-        }
-    }
-}
-
-/// Particle types of `--shape` options; spheres if there are none.
-pub fn types(shapes: &[ShapeShare]) -> Result<ParticleTypes, Failure> {
-    let sphere = [ShapeShare {
-        shape: "sphere".to_owned(),
-        fraction: None,
-    }];
-    let shapes = if shapes.is_empty() { &sphere } else { shapes };
-    let shares = shares(shapes).or_usage("--shape")?;
-    let bodies = shapes
-        .iter()
-        .zip(shares)
-        .map(|(shape, share)| Ok((file_name(&shape.shape), body(&shape.shape)?, share)))
-        .collect::<Result<_, Failure>>()?;
-    ParticleTypes::new(bodies).or_fail()
-}
-
-/// Outputs hold no paths: a mesh file goes by its name.
-fn file_name(shape: &str) -> String {
-    Path::new(shape)
-        .file_name()
-        .map_or_else(|| shape.to_owned(), |name| name.to_string_lossy().into_owned())
+/// The slice of every profile, if all have one.
+fn slices(profiles: &[TableProfile]) -> Vec<usize> {
+    let slices: Option<Vec<usize>> = profiles.iter().map(|profile| profile.slice).collect();
+    slices.unwrap_or_default()
 }
 
 /// What was found, of one type or of several together.
@@ -293,6 +119,7 @@ impl Unfold {
             sizes: profiles.iter().map(|profile| profile.size).collect(),
             weights: profiles.iter().map(|profile| profile.weight).collect(),
             categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
+            slices: slices(profiles),
             area,
             min_size: 0.0,
         };
@@ -327,6 +154,8 @@ impl Unfold {
         options: &UnfoldOptions,
         progress: unfold::Progress<'_>,
     ) -> Result<Found, Failure> {
+        let threshold = options.min_size.unwrap_or(0.0);
+        let bins = UnfoldingBins::new(edges, threshold, options.method, self.choices.sizes());
         let mut parts = Vec::new();
         for (kind, of) in types.types().iter().enumerate() {
             let own = || profiles.iter().filter(|profile| profile.kind == Some(kind));
@@ -339,8 +168,16 @@ impl Unfold {
                     of.name
                 )));
             }
-            let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), edges, area).at(&self.profiles)?;
-            parts.push((counts, of.kernel(edges, edges, self.choices.sizes()).or_fail()?));
+            let own_slices: Vec<usize> = own().filter_map(|profile| profile.slice).collect();
+            let counts = if own_slices.len() == sizes.len() {
+                ProfileCounts::from_slices(&sizes, Some(&weights), &own_slices, &bins.profile_edges, area)
+            } else {
+                ProfileCounts::from_sizes(&sizes, Some(&weights), &bins.profile_edges, area)
+            };
+            let kernel = of
+                .kernel(&bins.profile_edges, &bins.size_edges, self.choices.sizes())
+                .or_fail()?;
+            parts.push((counts.at(&self.profiles)?, kernel.reported_in(edges).or_fail()?));
         }
         if let Some(profile) = profiles
             .iter()
@@ -353,9 +190,17 @@ impl Unfold {
         sum.number_density = found.number_density;
         sum.intervals = found.intervals;
         (sum.total, sum.mean_size, sum.volume_fraction) = (found.total, found.mean_size, found.volume_fraction);
+        (sum.surface_density, sum.distribution) = (found.surface_density, found.distribution);
         (sum.observed, sum.refolded) = (found.observed, found.refolded);
         for part in &found.types[1..] {
             sum.profiles += part.profiles;
+            for (sum, part) in [
+                (&mut sum.profiles_per_area, part.profiles_per_area),
+                (&mut sum.area_fraction, part.area_fraction),
+            ] {
+                sum.observed += part.observed;
+                sum.expected += part.expected;
+            }
             sum.deviance += part.deviance;
             sum.degrees_of_freedom += part.degrees_of_freedom;
             sum.condition_number = sum.condition_number.max(part.condition_number);
@@ -451,46 +296,4 @@ impl Unfold {
         }
         answer
     }
-}
-
-/// Fields of the JSON object that an unfolding fills.
-pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
-    let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
-        let intervals = found.intervals.as_ref()?;
-        Some(intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
-    };
-    let mut fields = vec![
-        ("edges", json!(found.edges)),
-        ("number_density", json!(found.number_density)),
-        ("lower", json!(ends(|interval| interval.lower))),
-        ("upper", json!(ends(|interval| interval.upper))),
-    ];
-    for (names, estimate) in [
-        (["total", "total_lower", "total_upper"], found.total),
-        (["mean_size", "mean_size_lower", "mean_size_upper"], found.mean_size),
-        (
-            ["volume_fraction", "volume_fraction_lower", "volume_fraction_upper"],
-            found.volume_fraction,
-        ),
-    ] {
-        fields.push((names[0], json!(estimate.value)));
-        if let Some(interval) = estimate.interval {
-            fields.push((names[1], json!(interval.lower)));
-            fields.push((names[2], json!(interval.upper)));
-        }
-    }
-    fields.extend([
-        ("profiles", json!(found.profiles)),
-        ("observed", json!(found.observed)),
-        ("refolded", json!(found.refolded)),
-        ("deviance", json!(found.deviance)),
-        ("degrees_of_freedom", json!(found.degrees_of_freedom)),
-        ("condition_number", json!(found.condition_number)),
-        ("penalty", Value::Null),
-        ("method", json!(found.method.name())),
-        ("kernel", json!(kernel)),
-        ("threshold", json!(found.threshold)),
-        ("clamped_bins", json!(found.clamped_bins.len())),
-    ]);
-    fields
 }

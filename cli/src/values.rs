@@ -62,6 +62,55 @@ impl FromStr for BinCount {
     }
 }
 
+/// The largest size of a particle: a length, or how it is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MaxSize {
+    /// Known.
+    Length(f64),
+    /// That of the largest profile.
+    Profile,
+    /// The largest profile corrected for what it falls short of.
+    Corrected,
+    /// Of highest likelihood.
+    Likelihood,
+}
+
+impl FromStr for MaxSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "profile" => Ok(Self::Profile),
+            "corrected" => Ok(Self::Corrected),
+            "likelihood" => Ok(Self::Likelihood),
+            length => positive(length)
+                .map(Self::Length)
+                .map_err(|error| format!("{error}, or profile, corrected, likelihood")),
+        }
+    }
+}
+
+/// A capping angle in degrees, or `fit`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CappingAngle {
+    /// Known.
+    Degrees(f64),
+    /// Of highest likelihood.
+    Fit,
+}
+
+impl FromStr for CappingAngle {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim().parse::<f64>() {
+            Ok(angle) if (0.0..90.0).contains(&angle) => Ok(Self::Degrees(angle)),
+            _ if text.trim() == "fit" => Ok(Self::Fit),
+            _ => Err("an angle from 0 to below 90 degrees is needed, or fit".to_owned()),
+        }
+    }
+}
+
 /// A number of bins, from 1 to 1000.
 pub fn bins(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {

@@ -41,6 +41,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing for fine textures; otherwise a photograph of higher resolution, or fewer --levels.",
     ),
     (
+        "fewer-bins",
+        "More size bins were asked for than there are profiles: so many bins as profiles were used.",
+        "Give fewer --bins, or --bins auto, or photographs of a larger area.",
+    ),
+    (
         "fines-left-out",
         "The smallest sizes were left out of the packing, to keep the number of particles feasible.",
         "Give a smaller --box, or raise --min-size if they are not needed.",
@@ -68,7 +73,7 @@ pub const CODES: &[(&str, &str, &str)] = &[
     (
         "negative-bins",
         "Some unfolded number densities came out negative and were set to zero.",
-        "Use fewer --bins, photographs of a larger area, or --method em, which stays positive by construction.",
+        "Use as many --bins as the message names, a threshold (--min-size), or --method auto.",
     ),
     (
         "no-binder",
@@ -88,7 +93,7 @@ pub const CODES: &[(&str, &str, &str)] = &[
     (
         "oscillating-bins",
         "Densities of neighbouring bins swing up and down: the counts cannot carry so many bins.",
-        "Use fewer --bins, or photographs of a larger area.",
+        "Use as many --bins as the message names, --method auto, or photographs of a larger area.",
     ),
     (
         "paper-normalisation",

@@ -7,8 +7,9 @@
 //! ln p(n | λ, r) ≈ ℓ(θ̂) − λ/2 |Dθ̂|² + (m − r)/2 ln λ + ½ ln |DDᵀ| − ½ ln |I + λ DᵀD| − r ln(σ √m)
 //! ```
 //!
-//! where the last term is the price of the r directions the penalty leaves free, polynomials below degree r, each with a standard deviation of σ = 2 a node.
-//! Fits along λ = 10^k, k falling, and r = 1, 2, 3 are averaged with their evidence as weights (empirical Bayes with nothing chosen by hand).
+//! where the last term is the price of the r directions the penalty leaves free, polynomials below degree r, each with a standard deviation of σ = 1 a node.
+//! Fits along λ = 10^k, k falling, and at half decades about the best, for r = 1, 2, 3: the logarithms of their densities are averaged with the evidence as
+//! weights (empirical Bayes with nothing chosen by hand).
 
 use crate::log_densities::{Design, Peak, Penalty, Workspace, climb};
 
@@ -17,8 +18,8 @@ const FREE_SPREAD: f64 = 1.0;
 /// ln of the weight the path begins at, per order, for [`REFERENCE_NODES`] nodes: practically a polynomial.
 const HEAVIEST: [f64; 3] = [5.0, 6.0, 7.0];
 const REFERENCE_NODES: f64 = 40.0;
-/// Weights fall by this factor, in powers of ten.
-const DECADES: f64 = 1.0;
+/// Weights fall by this factor.
+const DECADE: f64 = 10.0;
 const MOST_WEIGHTS: usize = 12;
 /// The path ends where the evidence is lower than the best by this: 1/400 of its weight.
 const ENOUGH: f64 = 6.0;
@@ -26,7 +27,7 @@ const ENOUGH: f64 = 6.0;
 /// The fits of all orders and weights that the counts bear, and their mean.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SmoothFit {
-    /// Densities of the nodes, averaged by evidence.
+    /// Densities of the nodes: their logarithms averaged by evidence.
     pub(crate) densities: Vec<f64>,
     /// ln of the evidence, averaged over the weights tried.
     pub(crate) evidence: f64,
@@ -62,10 +63,12 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
         let weight = (step.evidence - top).exp();
         whole += weight;
         for (density, t) in densities.iter_mut().zip(&step.peak.theta) {
-            *density += weight * t.exp();
+            *density += weight * t;
         }
     }
-    densities.iter_mut().for_each(|density| *density /= whole);
+    densities
+        .iter_mut()
+        .for_each(|density| *density = (*density / whole).exp());
     let best = |order: Option<usize>| {
         steps
             .iter()
@@ -86,7 +89,7 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
     }
 }
 
-/// Fits from the heaviest weight down, each from where the last one ended, until the evidence is lost.
+/// Fits from the heaviest weight down, each from where the last one ended, until the evidence is lost; then at half steps about the best.
 fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> Vec<Step> {
     let nodes = design.nodes();
     let rank = nodes.saturating_sub(order) as f64;
@@ -94,24 +97,30 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
         0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (FREE_SPREAD * (nodes as f64).sqrt()).ln();
     // The same roughness in finer nodes: differences of order r shrink with r powers of the spacing.
     let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
-    let mut start = vec![level(design, counts).ln(); nodes];
-    let mut steps: Vec<Step> = Vec::new();
-    let mut best = f64::NEG_INFINITY;
-    for k in 0..MOST_WEIGHTS {
-        let weight = 10_f64.powf(HEAVIEST[order - 1] + finer - DECADES * k as f64);
+    let mut step = |weight: f64, start: &[f64]| {
         let penalty = Penalty { order, weight };
-        let peak = climb(design, counts, penalty, &start, Peak::LAST_GAIN, room);
-        start.clone_from(&peak.theta);
+        let peak = climb(design, counts, penalty, start, Peak::LAST_GAIN, room);
         let evidence = peak.value + 0.5 * (rank * weight.ln() - peak.log_determinant) + constant;
-        best = best.max(evidence);
-        steps.push(Step {
+        Step {
             penalty,
             peak,
             evidence,
-        });
-        if evidence < best - ENOUGH {
-            break;
         }
+    };
+    let heaviest = 10_f64.powf(HEAVIEST[order - 1] + finer);
+    let mut steps = vec![step(heaviest, &vec![level(design, counts).ln(); nodes])];
+    let mut best = 0;
+    while steps.len() < MOST_WEIGHTS && steps[steps.len() - 1].evidence >= steps[best].evidence - ENOUGH {
+        let last = &steps[steps.len() - 1];
+        let next = step(last.penalty.weight / DECADE, &last.peak.theta);
+        if next.evidence > steps[best].evidence {
+            best = steps.len();
+        }
+        steps.push(next);
+    }
+    for factor in [DECADE.sqrt(), 1.0 / DECADE.sqrt()] {
+        let half = step(steps[best].penalty.weight * factor, &steps[best].peak.theta);
+        steps.push(half);
     }
     steps
 }

@@ -51,7 +51,7 @@ pub fn unknown_fractions(
     // With two types one fraction gives the other.
     let asked = if types == 2 { 1 } else { types };
     for _ in 0..if types == 2 { 1 } else { ROUNDS } {
-        for of in 0..asked {
+        for (of, interval) in intervals.iter_mut().enumerate().take(asked) {
             let current = fractions.clone();
             let with = |fraction: f64| with_fraction(&current, of, fraction);
             let found = likely_parameter(
@@ -62,7 +62,7 @@ pub fn unknown_fractions(
                 options,
             )?;
             fractions = with(found.value);
-            intervals[of] = found.interval;
+            *interval = found.interval;
         }
     }
     if types == 2 {

@@ -152,6 +152,7 @@ pub fn run(program: &Path, data: &Path, results: &Path, table: &Path) -> Result<
         }
     }
     text.push_str(&truths);
+    text.push_str(&crate::sand::compare(data)?);
     text.push_str(&times);
     fs::write(table, &text)?;
     println!("{text}");

@@ -3,6 +3,7 @@
 mod acceptance;
 mod figures;
 mod sample;
+mod sand;
 mod tidy;
 
 use std::path::{Path, PathBuf};

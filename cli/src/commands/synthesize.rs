@@ -9,7 +9,7 @@ use stereology::anneal::PackOptions;
 use stereology::files;
 use stereology::grid::Format;
 use stereology::pipeline::{
-    self, Comparison, DensityOptions, Extent, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions,
+    self, Comparison, DensityOptions, Extent, LargestSize, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions,
 };
 use stereology::pyramid::TextureReport;
 use stereology::render::{BlockOptions, render_block};
@@ -142,7 +142,13 @@ impl Synthesize {
         let edges = match (&unfold.edges, unfold.spacing) {
             (None, Spacing::Equal) => None,
             // Lengths are in the unit of the results here.
-            _ => Some(unfold.size_edges(&[], 1.0)?),
+            _ => {
+                let largest = match unfold.largest(1.0) {
+                    LargestSize::Given(size) => size,
+                    _ => f64::NAN,
+                };
+                Some(unfold.size_edges(&[], largest, 1.0)?)
+            }
         };
         Ok(SynthesisOptions {
             pixel: everywhere.scale,
@@ -154,7 +160,8 @@ impl Synthesize {
                     Some(BinCount::Auto) => 0,
                 },
                 edges,
-                max_size: unfold.max_size,
+                max_size: unfold.largest(1.0),
+                capping: unfold.capping(),
                 sizes: unfold.sizes(),
                 unfold: Unfolding {
                     bootstrap: unfold.bootstrap.or(Some(REPLICATES)),

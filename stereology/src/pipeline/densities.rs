@@ -1,7 +1,9 @@
 //! From measured profiles to particles per volume, colour category by colour category where size and colour go together.
 
 use crate::pipeline::association::{Association, association};
-use crate::pipeline::{ParticleTypes, ParticleTypesError, Warning};
+use crate::pipeline::{
+    Capping, LargestSize, ParticleTypes, ParticleTypesError, Warning, capping_angle, largest_particle,
+};
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
     Finding, Kernel, Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, automatic_bins,
@@ -32,8 +34,10 @@ pub struct DensityOptions {
     pub bins: usize,
     /// Edges of the size bins instead.
     pub edges: Option<Vec<f64>>,
-    /// Largest particle size; by default that of the largest counted profile (eq. 7: it is a cut through the middle of the largest particle).
-    pub max_size: Option<f64>,
+    /// Largest particle size; by default that of the largest counted profile.
+    pub max_size: LargestSize,
+    /// Profiles lost at the rims of particles.
+    pub capping: Capping,
     /// Where in a bin its particles' sizes lie.
     pub sizes: Sizes,
     /// The estimator, its threshold and intervals. Without a threshold that of the profiles is used.
@@ -46,7 +50,8 @@ impl Default for DensityOptions {
         Self {
             bins: 16,
             edges: None,
-            max_size: None,
+            max_size: LargestSize::Profile,
+            capping: Capping::None,
             sizes: Sizes::Integrated,
             unfold: UnfoldOptions::default(),
         }
@@ -122,11 +127,10 @@ pub fn particle_densities(
     if places.is_empty() {
         return Err(DensityError::NoProfiles(profiles.sizes.len()));
     }
-    let largest = places.iter().map(|&i| profiles.sizes[i]).fold(0.0, f64::max);
     let edges = match &options.edges {
         Some(edges) => edges.clone(),
         None => {
-            let largest = options.max_size.unwrap_or(largest);
+            let (largest, _) = largest_particle(profiles, types, options.max_size, &options.unfold)?;
             let counted: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
             let bins = match options.bins {
                 0 => automatic_bins(&counted, largest, MOST_BINS),
@@ -141,10 +145,8 @@ pub fn particle_densities(
         ..options.unfold
     };
     let fit_bins = UnfoldingBins::new(&edges, threshold, options.unfold.method, options.sizes);
-    let kernel = reported(
-        types.kernel(&fit_bins.profile_edges, &fit_bins.size_edges, options.sizes)?,
-        &edges,
-    )?;
+    let (angle, _) = capping_angle(profiles, types, options.capping, &edges, &unfolding)?;
+    let kernel = reported(types.capped_kernel(angle, &fit_bins, options.sizes)?, &edges)?;
     let unfold_these = |places: &[usize], options: &UnfoldOptions| {
         let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
         let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
@@ -162,7 +164,7 @@ pub fn particle_densities(
         let edges = equal_edges(edges[edges.len() - 1], bins);
         let bins = UnfoldingBins::new(&edges, threshold, unfolding.method, options.sizes);
         let found = || {
-            let kernel = types.kernel(&bins.profile_edges, &bins.size_edges, options.sizes)?;
+            let kernel = types.capped_kernel(angle, &bins, options.sizes)?;
             let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
             let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
             let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), &bins.profile_edges, profiles.area)?;

@@ -101,6 +101,25 @@ impl ParticleTypes {
         Ok(Self { types })
     }
 
+    /// The same types in other shares, scaled to sum to 1; shares beyond the types are ignored.
+    ///
+    /// # Errors
+    ///
+    /// [`ParticleTypesError::Share`] for a share that is negative or not finite, or if all are zero.
+    pub fn with_shares(mut self, shares: &[f64]) -> Result<Self, ParticleTypesError> {
+        let whole: f64 = shares.iter().take(self.types.len()).sum();
+        for (of, &share) in self.types.iter_mut().zip(shares) {
+            if !(share.is_finite() && share >= 0.0 && whole > 0.0) {
+                return Err(ParticleTypesError::Share {
+                    name: of.name.clone(),
+                    share,
+                });
+            }
+            of.share = share / whole;
+        }
+        Ok(self)
+    }
+
     /// Types from words, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file.
     ///
     /// # Errors

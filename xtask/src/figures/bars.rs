@@ -13,8 +13,8 @@ pub struct Series<'a> {
     pub name: &'a str,
     /// Height of each bar.
     pub values: &'a [f64],
-    /// Half the length of each bar's error whisker.
-    pub errors: Option<&'a [f64]>,
+    /// Lower and upper end of each bar's whisker.
+    pub errors: Option<&'a [(f64, f64)]>,
     /// Colour.
     pub colour: RGBColor,
 }
@@ -34,6 +34,7 @@ pub struct Panel<'a> {
 pub const BLUE: RGBColor = RGBColor(62, 105, 160);
 pub const RED: RGBColor = RGBColor(196, 78, 60);
 pub const GREEN: RGBColor = RGBColor(60, 140, 95);
+pub const GREY: RGBColor = RGBColor(165, 165, 165);
 const INK: RGBColor = RGBColor(50, 50, 50);
 const PANEL: (u32, u32) = (430, 320);
 
@@ -60,7 +61,7 @@ fn draw_panel(
             of.values
                 .iter()
                 .enumerate()
-                .map(|(i, v)| v + of.errors.map_or(0.0, |e| e[i]))
+                .map(|(i, v)| of.errors.map_or(*v, |e| e[i].1.max(*v)))
         })
         .fold(1e-300, f64::max);
     let mut chart = ChartBuilder::on(area)
@@ -90,11 +91,11 @@ fn draw_panel(
             .label(of.name)
             .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
         if let Some(errors) = of.errors {
-            let whisker = |(i, &value): (usize, &f64)| {
+            let whisker = |(i, &(lower, upper)): (usize, &(f64, f64))| {
                 let x = left(i) + 0.5 * width;
-                PathElement::new(vec![(x, (value - errors[i]).max(0.0)), (x, value + errors[i])], INK)
+                PathElement::new(vec![(x, lower), (x, upper)], INK)
             };
-            chart.draw_series(of.values.iter().enumerate().map(whisker))?;
+            chart.draw_series(errors.iter().enumerate().map(whisker))?;
         }
     }
     if panel.series.len() > 1 {

@@ -15,53 +15,17 @@ use stereology::anneal::{
     Grain, PackOptions, Packing, SizeDensities, SizeInBin, grains_from_densities, pack, populate,
 };
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::ParticleTypes;
+use stereology::pipeline::{ParticleTypes, UnfoldingBins};
 use stereology::render::{BlockOptions, render_block};
 use stereology::shape::{PeriodicBox, UnitBody};
-use stereology::unfold::{Method, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold};
+use stereology::unfold::{Bootstrap, Method, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold};
 use stereology::volume::{Axis, Solid};
 
-use super::bars::{BLUE, GREEN, Panel, RED, Series, draw as draw_bars, table};
+use super::bars::{BLUE, GREEN, GREY, Panel, RED, Series, draw as draw_bars, table};
+use super::grain_size_tools::saltykov;
+use super::sphere_samples::{AREA, FIGURE_7, PLANES, SIDE};
 
 const BINS: usize = 10;
-/// Side of the box in largest diameters; planes are farther apart than any sphere is wide.
-const SIDE: f64 = 12.0;
-const PLANES: usize = 10;
-
-struct Distribution {
-    name: &'static str,
-    /// Density of diameters on (0, 1], not scaled.
-    density: fn(f64) -> f64,
-    /// Profiles to be expected.
-    profiles: f64,
-}
-
-const DISTRIBUTIONS: [Distribution; 4] = [
-    Distribution {
-        name: "single mode",
-        density: |d| gauss(d, 0.55, 0.15),
-        profiles: 1200.0,
-    },
-    Distribution {
-        name: "bimodal",
-        density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08),
-        profiles: 1250.0,
-    },
-    Distribution {
-        name: "lognormal",
-        density: |d| gauss(d.ln(), 0.30_f64.ln(), 0.45) / d,
-        profiles: 1150.0,
-    },
-    Distribution {
-        name: "constant",
-        density: |_| 1.0,
-        profiles: 1300.0,
-    },
-];
-
-fn gauss(x: f64, mean: f64, deviation: f64) -> f64 {
-    (-0.5 * ((x - mean) / deviation).powi(2)).exp()
-}
 
 /// A packing, its true densities and the sizes of the profiles on its planes.
 struct Experiment {
@@ -69,31 +33,21 @@ struct Experiment {
     packing: Packing,
     actual: Vec<f64>,
     paper: Unfolding,
-    em: Unfolding,
+    auto: Unfolding,
+    /// Shares of the classes, times the total of `auto`: GrainSizeTools has none.
+    grain_size_tools: Vec<f64>,
 }
 
 fn experiment(index: usize) -> Result<Experiment> {
-    let of = &DISTRIBUTIONS[index];
+    let of = &FIGURE_7[index];
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     rng.set_stream(index as u64);
-    // Inverse of the cumulative distribution on a fine grid.
-    let steps = 20_000;
-    let at = |i: usize| (i as f64 + 0.5) / steps as f64;
-    let whole: f64 = (0..steps).map(|i| (of.density)(at(i))).sum();
-    let mean: f64 = (0..steps).map(|i| at(i) * (of.density)(at(i))).sum::<f64>() / whole;
-    let cumulative: Vec<f64> = (0..steps)
-        .scan(0.0, |sum, i| {
-            *sum += (of.density)(at(i)) / whole;
-            Some(*sum)
-        })
-        .collect();
-    // N_A = N_V × mean diameter, eq. (1).
-    let count = of.profiles / (PLANES as f64 * SIDE * SIDE * mean) * SIDE.powi(3);
-    let draw = |place: f64| (cumulative.partition_point(|c| *c < place).min(steps - 1) + 1) as f64 / steps as f64;
+    let population = of.population();
+    let count = population.number_density * SIDE.powi(3);
     let grains: Vec<Grain> = (0..count.round() as usize)
         .map(|_| Grain {
             shape: 0,
-            size: draw(rng.random()),
+            size: population.draw(&mut rng),
             category: 0,
         })
         .collect();
@@ -107,20 +61,28 @@ fn experiment(index: usize) -> Result<Experiment> {
         .map(|(_, area)| (4.0 * area / PI).sqrt())
         .collect();
     let edges = equal_edges(1.0, BINS);
-    let area = PLANES as f64 * SIDE * SIDE;
-    let counts = ProfileCounts::from_sizes(&sizes, None, &edges, area)?;
     let estimate = |method: Method, spread: Sizes| -> Result<Unfolding> {
-        let kernel = types.kernel(&edges, &edges, spread)?;
-        Ok(unfold(&counts, &kernel, &UnfoldOptions::default().with_method(method))?)
+        let bins = UnfoldingBins::new(&edges, 0.0, method, spread);
+        let counts = ProfileCounts::from_sizes(&sizes, None, &bins.profile_edges, AREA)?;
+        let kernel = types
+            .kernel(&bins.profile_edges, &bins.size_edges, spread)?
+            .reported_in(&edges)?;
+        let options = UnfoldOptions::default()
+            .with_method(method)
+            .with_bootstrap(Bootstrap::default());
+        Ok(unfold(&counts, &kernel, &options)?)
     };
     let mut actual = vec![0.0; BINS];
     for grain in &grains {
         actual[(edges.partition_point(|edge| *edge < grain.size) - 1).min(BINS - 1)] += SIDE.powi(-3);
     }
+    let auto = estimate(Method::Auto, Sizes::Integrated)?;
+    let shares = saltykov(&sizes, 1.0, BINS);
     Ok(Experiment {
         name: of.name,
         paper: estimate(Method::Paper, Sizes::UpperEdge)?,
-        em: estimate(Method::Em, Sizes::Integrated)?,
+        grain_size_tools: shares.iter().map(|share| share * auto.total.value).collect(),
+        auto,
         packing,
         actual,
     })
@@ -167,25 +129,35 @@ fn values(unfolding: &Unfolding) -> Vec<f64> {
     unfolding.number_density.iter().map(|n| n.unwrap_or(0.0)).collect()
 }
 
+/// The ends of the intervals of each bin.
+fn ends(unfolding: &Unfolding) -> Vec<(f64, f64)> {
+    let intervals = unfolding.intervals.iter().flatten();
+    intervals
+        .map(|of| of.map_or((0.0, 0.0), |of| (of.lower, of.upper)))
+        .collect()
+}
+
 pub fn draw(folder: &Path) -> Result<()> {
-    let experiments = (0..DISTRIBUTIONS.len())
+    let experiments = (0..FIGURE_7.len())
         .into_par_iter()
         .map(experiment)
         .collect::<Result<Vec<_>>>()?;
-    let bars: Vec<(String, Vec<f64>, Vec<f64>)> = experiments
+    type Bars = (String, Vec<f64>, Vec<f64>, Vec<(f64, f64)>);
+    let bars: Vec<Bars> = experiments
         .iter()
         .map(|of| {
             (
-                format!("{} ({} profiles)", of.name, of.em.profiles),
+                format!("{} ({} profiles)", of.name, of.auto.profiles),
                 values(&of.paper),
-                values(&of.em),
+                values(&of.auto),
+                ends(&of.auto),
             )
         })
         .collect();
     let panels: Vec<Panel<'_>> = experiments
         .iter()
         .zip(&bars)
-        .map(|(of, (title, paper, em))| Panel {
+        .map(|(of, (title, paper, auto, ends))| Panel {
             title,
             across: "diameter over the largest",
             up: "particles per volume",
@@ -203,9 +175,15 @@ pub fn draw(folder: &Path) -> Result<()> {
                     colour: RED,
                 },
                 Series {
-                    name: "expectation maximisation",
-                    values: em,
+                    name: "GrainSizeTools (no total)",
+                    values: &of.grain_size_tools,
                     errors: None,
+                    colour: GREY,
+                },
+                Series {
+                    name: "auto, 90 % intervals",
+                    values: auto,
+                    errors: Some(ends),
                     colour: GREEN,
                 },
             ],
@@ -215,9 +193,17 @@ pub fn draw(folder: &Path) -> Result<()> {
     let rows: Vec<Vec<String>> = experiments
         .iter()
         .zip(&bars)
-        .flat_map(|(of, (_, paper, em))| {
+        .flat_map(|(of, (_, paper, auto, ends))| {
             (0..BINS).map(move |i| {
-                let numbers = [(i + 1) as f64 / BINS as f64, of.actual[i], paper[i], em[i]];
+                let numbers = [
+                    (i + 1) as f64 / BINS as f64,
+                    of.actual[i],
+                    paper[i],
+                    of.grain_size_tools[i],
+                    auto[i],
+                    ends[i].0,
+                    ends[i].1,
+                ];
                 std::iter::once(of.name.to_owned())
                     .chain(numbers.map(|n| format!("{n:.5}")))
                     .collect()
@@ -226,7 +212,16 @@ pub fn draw(folder: &Path) -> Result<()> {
         .collect();
     table(
         &folder.join("figure-07-density-recovery.csv"),
-        &["distribution", "upper_edge", "actual", "paper", "em"],
+        &[
+            "distribution",
+            "upper_edge",
+            "actual",
+            "paper",
+            "grain_size_tools",
+            "auto",
+            "auto_lower",
+            "auto_upper",
+        ],
         &rows,
     )
 }
@@ -236,7 +231,7 @@ pub fn draw_volumes(folder: &Path) -> Result<()> {
     let of = experiment(0)?;
     let types = ParticleTypes::parse(&["sphere"])?;
     let edges = equal_edges(1.0, BINS);
-    let number_density = values(&of.em);
+    let number_density = values(&of.auto);
     let recovered = SizeDensities {
         shape: 0,
         category: 0,

@@ -2,8 +2,11 @@
 
 mod bars;
 mod density_recovery;
+mod estimators;
+mod grain_size_tools;
 mod section_likelihood;
 mod solids;
+mod sphere_samples;
 
 use std::path::Path;
 
@@ -13,12 +16,14 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 6] = [
+    let figures: [(&str, Figure); 8] = [
         ("figure-04-section-likelihood", section_likelihood::draw),
         ("figure-05-10-solid", solids::draw_blocks),
         ("figure-06-residual", solids::draw_residual),
         ("figure-07-density-recovery", density_recovery::draw),
         ("figure-08-recovered-volume", density_recovery::draw_volumes),
+        ("estimators", estimators::draw_errors),
+        ("coverage", estimators::draw_coverage),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

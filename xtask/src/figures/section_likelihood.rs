@@ -25,16 +25,27 @@ pub fn draw(folder: &Path) -> Result<()> {
         let last = |matrix: nalgebra::DMatrix<f64>| matrix.column(BINS - 1).iter().copied().collect::<Vec<f64>>();
         figures.push((*name, last(law.k_matrix(BINS)), last(law.k_standard_errors(BINS))));
     }
+    let whiskers: Vec<Vec<(f64, f64)>> = figures
+        .iter()
+        .map(|(_, likelihood, errors)| {
+            likelihood
+                .iter()
+                .zip(errors)
+                .map(|(l, e)| ((l - e).max(0.0), l + e))
+                .collect()
+        })
+        .collect();
     let panels: Vec<Panel<'_>> = figures
         .iter()
-        .map(|(name, likelihood, errors)| Panel {
+        .zip(&whiskers)
+        .map(|((name, likelihood, _), whiskers)| Panel {
             title: name,
             across: "√(A / A_max)",
             up: "likelihood",
             series: vec![Series {
                 name: "",
                 values: likelihood,
-                errors: Some(errors),
+                errors: Some(whiskers),
                 colour: BLUE,
             }],
         })

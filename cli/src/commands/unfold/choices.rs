@@ -4,14 +4,14 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::ParticleTypes;
+use stereology::pipeline::{Capping, LargestSize, ParticleTypes};
 use stereology::unfold::{
     self, Bootstrap, Resampling, UnfoldOptions, automatic_bins, equal_edges, geometric_edges, phi_edges,
 };
 
 use crate::failure::{Explain, Failure, body};
 use crate::profile_table::TableProfile;
-use crate::values::{BinCount, Edges, ShapeShare, count, positive, share, shares};
+use crate::values::{BinCount, CappingAngle, Edges, MaxSize, ShapeShare, count, positive, share, shares};
 
 /// Size bins if not given.
 pub const BINS: usize = 10;
@@ -36,12 +36,15 @@ pub struct Choices {
     /// Shape of the particles and its share of them; may be repeated [default: sphere]
     #[arg(long, value_name = "SHAPE[=F]")]
     pub shape: Vec<ShapeShare>,
-    /// Largest particle size [default: the largest profile]
-    #[arg(long, value_name = "D", value_parser = positive, conflicts_with = "edges")]
-    pub max_size: Option<f64>,
+    /// Largest particle size; or `corrected`, the largest profile and what it falls short of; or `likelihood` [default: `profile`, the largest profile]
+    #[arg(long, value_name = "D", conflicts_with = "edges")]
+    pub max_size: Option<MaxSize>,
     /// Profiles up to this size are not observed: nothing is said about particles below it
     #[arg(long, value_name = "T", value_parser = positive)]
     pub min_size: Option<f64>,
+    /// Particles of size D show no profile below D sin of this angle in degrees (Keiding & Jensen's capping angle); fit: the most likely angle
+    #[arg(long, value_name = "DEGREES|fit")]
+    pub capping_angle: Option<CappingAngle>,
     /// How to solve
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     pub method: Method,
@@ -166,8 +169,27 @@ impl Choices {
         Ok(options)
     }
 
-    /// Edges of the size bins, for profiles of these sizes.
-    pub fn size_edges(&self, profiles: &[TableProfile], scale: f64) -> Result<Vec<f64>, Failure> {
+    /// The largest size, lengths multiplied by `scale`.
+    pub fn largest(&self, scale: f64) -> LargestSize {
+        match self.max_size {
+            None | Some(MaxSize::Profile) => LargestSize::Profile,
+            Some(MaxSize::Corrected) => LargestSize::Corrected,
+            Some(MaxSize::Likelihood) => LargestSize::Likelihood,
+            Some(MaxSize::Length(size)) => LargestSize::Given(size * scale),
+        }
+    }
+
+    /// What is lost at the rims.
+    pub fn capping(&self) -> Capping {
+        match self.capping_angle {
+            None => Capping::None,
+            Some(CappingAngle::Degrees(angle)) => Capping::Angle(angle.to_radians()),
+            Some(CappingAngle::Fit) => Capping::Likelihood,
+        }
+    }
+
+    /// Edges of the size bins up to the largest size, for profiles of these sizes.
+    pub fn size_edges(&self, profiles: &[TableProfile], largest: f64, scale: f64) -> Result<Vec<f64>, Failure> {
         if let Some(Edges(edges)) = &self.edges {
             return Ok(edges.iter().map(|edge| edge * scale).collect());
         }
@@ -177,9 +199,6 @@ impl Choices {
                 .filter(|profile| profile.weight > 0.0)
                 .map(|profile| profile.size)
         };
-        let largest = self
-            .max_size
-            .map_or_else(|| counted().fold(0.0, f64::max), |size| size * scale);
         let count = match self.bins {
             None => BINS,
             Some(BinCount::Number(count)) => count,

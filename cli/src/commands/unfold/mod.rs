@@ -8,9 +8,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 use stereology::files::DensityRows;
-use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, particle_densities};
+use stereology::pipeline::{
+    Capping, DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, capping_angle, largest_particle,
+    particle_densities, type_shares,
+};
 use stereology::unfold::{
-    self, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, unfold_types_with_progress,
+    self, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold_types_with_progress,
 };
 
 use crate::answer::Answer;
@@ -51,6 +54,9 @@ pub struct Unfold {
     pub area: f64,
     #[command(flatten)]
     pub choices: Choices,
+    /// Find the shares of several --shape from the profiles; refused where these do not tell
+    #[arg(long, help_heading = "Unfolding")]
+    pub unknown_fractions: bool,
     /// Also write the densities as a table: lower_edge,upper_edge,number_density,lower,upper,type,category
     #[arg(short, long, value_name = "densities.csv")]
     pub output: Option<PathBuf>,
@@ -60,6 +66,13 @@ pub struct Unfold {
 fn slices(profiles: &[TableProfile]) -> Vec<usize> {
     let slices: Option<Vec<usize>> = profiles.iter().map(|profile| profile.slice).collect();
     slices.unwrap_or_default()
+}
+
+/// As many equal bins as there are profiles, if more were asked for.
+fn fewer_bins(edges: &[f64], profiles: &MeasuredProfiles, choices: &Choices) -> Option<Vec<f64>> {
+    let counted = profiles.weights.iter().filter(|weight| **weight > 0.0).count();
+    let equal = choices.edges.is_none() && choices.spacing == Spacing::Equal;
+    (equal && edges.len() - 1 > counted).then(|| equal_edges(edges[edges.len() - 1], counted.max(1)))
 }
 
 /// What was found, of one type or of several together.
@@ -79,9 +92,30 @@ impl Unfold {
         let options = choices.unfold_options(scale, everywhere.seed)?;
         let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
         profiles.iter_mut().for_each(|profile| profile.size *= scale);
-        let types = choices.types()?;
-        let edges = choices.size_edges(&profiles, scale)?;
+        let mut types = choices.types()?;
         let area = self.area * scale * scale;
+        let measured = MeasuredProfiles {
+            sizes: profiles.iter().map(|profile| profile.size).collect(),
+            weights: profiles.iter().map(|profile| profile.weight).collect(),
+            categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
+            slices: slices(&profiles),
+            area,
+            min_size: 0.0,
+        };
+        let (largest, likely_size) =
+            largest_particle(&measured, &types, choices.largest(scale), &options).at(&self.profiles)?;
+        let edges = choices.size_edges(&profiles, largest, scale)?;
+        let fewer = fewer_bins(&edges, &measured, choices);
+        let edges = fewer.clone().unwrap_or(edges);
+        let (angle, likely_angle) =
+            capping_angle(&measured, &types, choices.capping(), &edges, &options).at(&self.profiles)?;
+        let fractions = if self.unknown_fractions {
+            let found = type_shares(&measured, &types, &edges, &options).at(&self.profiles)?;
+            types = types.with_shares(&found.fractions).or_fail()?;
+            Some(found)
+        } else {
+            None
+        };
         let step = Step::begin("unfolding", everywhere.quiet);
         let progress = |done: f64| step.at(done);
 
@@ -89,24 +123,74 @@ impl Unfold {
         let found = if labelled {
             self.labelled(&profiles, &types, &edges, area, &options, &progress)?
         } else {
-            self.together(&profiles, &types, &edges, area, &options, &progress)?
+            let options = DensityOptions {
+                edges: Some(edges.clone()),
+                sizes: choices.sizes(),
+                capping: Capping::Angle(angle),
+                unfold: options,
+                ..DensityOptions::default()
+            };
+            self.together(&profiles, &measured, &types, &options, &progress)?
         };
         drop(step);
         go_on()?;
         if let Some(output) = &self.output {
             found.rows.write(output).at(output)?;
         }
-        Ok(self.answer(&found, &profiles))
+        let mut answer = self.answer(&found, &profiles);
+        if fewer.is_some() {
+            let (bins, count) = (edges.len() - 1, profiles.len());
+            answer.warn(Warning::new(
+                "fewer-bins",
+                format!("{count} profiles do not bear more bins than profiles: {bins} equal bins were used"),
+            ));
+        }
+        for (name, likely) in [("max_size", likely_size), ("capping_angle", likely_angle)] {
+            if let Some(likely) = likely {
+                let (scale, unit) = if name == "max_size" {
+                    (1.0, "")
+                } else {
+                    (1.0_f64.to_degrees(), " degrees")
+                };
+                let [value, lower, upper] =
+                    [likely.value, likely.interval.lower, likely.interval.upper].map(|v| v * scale);
+                answer.field(
+                    name,
+                    json!({ "value": value, "lower": lower, "upper": upper, "unbounded": likely.unbounded }),
+                );
+                answer.line(format!(
+                    "{} by likelihood    {} ({} to {}){unit}",
+                    name.replace('_', " "),
+                    significant(value),
+                    significant(lower),
+                    significant(upper)
+                ));
+            }
+        }
+        if let Some(fractions) = fractions {
+            answer.field("fractions", json!(fractions.fractions));
+            answer.field(
+                "fractions_lower",
+                fractions.intervals.iter().map(|of| of.lower).collect::<Vec<_>>(),
+            );
+            answer.field(
+                "fractions_upper",
+                fractions.intervals.iter().map(|of| of.upper).collect::<Vec<_>>(),
+            );
+            answer.field("fractions_condition_number", json!(fractions.condition_number));
+            let shown: Vec<String> = fractions.fractions.iter().map(|&share| percent(share)).collect();
+            answer.line(format!("shares of the shapes        {}", shown.join(", ")));
+        }
+        Ok(answer)
     }
 
     /// All types share one size distribution: eqs. (10)-(12).
     fn together(
         &self,
         profiles: &[TableProfile],
+        measured: &MeasuredProfiles,
         types: &ParticleTypes,
-        edges: &[f64],
-        area: f64,
-        options: &UnfoldOptions,
+        options: &DensityOptions,
         progress: unfold::Progress<'_>,
     ) -> Result<Found, Failure> {
         if let Some(profile) = profiles
@@ -115,26 +199,12 @@ impl Unfold {
         {
             return Err(self.no_such_type(profile, types));
         }
-        let measured = MeasuredProfiles {
-            sizes: profiles.iter().map(|profile| profile.size).collect(),
-            weights: profiles.iter().map(|profile| profile.weight).collect(),
-            categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
-            slices: slices(profiles),
-            area,
-            min_size: 0.0,
-        };
-        let options = DensityOptions {
-            edges: Some(edges.to_vec()),
-            sizes: self.choices.sizes(),
-            unfold: *options,
-            ..DensityOptions::default()
-        };
-        let densities = particle_densities(&measured, types, &options, progress).at(&self.profiles)?;
+        let densities = particle_densities(measured, types, options, progress).at(&self.profiles)?;
         let mut rows = DensityRows::default();
         rows.unfolding(&densities.all, None, None);
         if densities.by_category.len() > 1 {
             for (category, density) in densities.by_category.iter().enumerate() {
-                rows.densities(edges, density, None, Some(category));
+                rows.densities(&densities.all.edges, density, None, Some(category));
             }
         }
         Ok(Found {

@@ -1,0 +1,165 @@
+//! The distributions of figure 7, and profiles of spheres that have them: what ten equally spaced planes through a box of spheres at random places show.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Poisson};
+
+/// Side of the box in largest diameters; planes are farther apart than any sphere is wide, so that none is cut twice.
+pub const SIDE: f64 = 12.0;
+/// Planes through it.
+pub const PLANES: usize = 10;
+/// Area of all planes.
+pub const AREA: f64 = PLANES as f64 * SIDE * SIDE;
+
+/// A distribution of diameters on (0, 1].
+pub struct Diameters {
+    /// What it is called.
+    pub name: &'static str,
+    /// Density of diameters, not scaled.
+    density: fn(f64) -> f64,
+    /// Profiles to be expected.
+    profiles: f64,
+}
+
+/// The paper's four.
+pub const FIGURE_7: [Diameters; 4] = [
+    Diameters {
+        name: "single mode",
+        density: |d| gauss(d, 0.55, 0.15),
+        profiles: 1200.0,
+    },
+    Diameters {
+        name: "bimodal",
+        density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08),
+        profiles: 1250.0,
+    },
+    Diameters {
+        name: "lognormal",
+        density: |d| gauss(d.ln(), 0.30_f64.ln(), 0.45) / d,
+        profiles: 1150.0,
+    },
+    Diameters {
+        name: "constant",
+        density: |_| 1.0,
+        profiles: 1300.0,
+    },
+];
+
+/// Two narrow bands: what smooth estimates cannot do.
+pub const TWO_BANDS: Diameters = Diameters {
+    name: "two bands",
+    density: |d| f64::from(u8::from((0.3..0.4).contains(&d) || (0.7..0.8).contains(&d))),
+    profiles: 1200.0,
+};
+
+fn gauss(x: f64, mean: f64, deviation: f64) -> f64 {
+    (-0.5 * ((x - mean) / deviation).powi(2)).exp()
+}
+
+const STEPS: usize = 20_000;
+
+/// A distribution ready to be drawn from.
+pub struct Population {
+    cumulative: Vec<f64>,
+    /// Spheres per unit volume.
+    pub number_density: f64,
+    /// Of the diameters.
+    pub mean: f64,
+    /// Share of the volume in spheres.
+    pub volume_fraction: f64,
+}
+
+impl Diameters {
+    /// As many spheres as show the expected profiles: N_A = ⟨D⟩ N_V, eq. (1).
+    pub fn population(&self) -> Population {
+        let at = |i: usize| (i as f64 + 0.5) / STEPS as f64;
+        let whole: f64 = (0..STEPS).map(|i| (self.density)(at(i))).sum();
+        let moment = |power: i32| {
+            (0..STEPS)
+                .map(|i| at(i).powi(power) * (self.density)(at(i)))
+                .sum::<f64>()
+                / whole
+        };
+        let number_density = self.profiles / (AREA * moment(1));
+        let cumulative = (0..STEPS).scan(0.0, |sum, i| {
+            *sum += (self.density)(at(i)) / whole;
+            Some(*sum)
+        });
+        Population {
+            cumulative: cumulative.collect(),
+            number_density,
+            mean: moment(1),
+            volume_fraction: number_density * std::f64::consts::PI / 6.0 * moment(3),
+        }
+    }
+}
+
+impl Population {
+    /// A diameter.
+    pub fn draw(&self, rng: &mut ChaCha8Rng) -> f64 {
+        let place: f64 = rng.random();
+        let step = self.cumulative.partition_point(|c| *c < place).min(STEPS - 1);
+        (step as f64 + rng.random::<f64>().max(1e-9)) / STEPS as f64
+    }
+
+    /// Spheres per unit volume in each of `bins` equal bins.
+    pub fn densities(&self, bins: usize) -> Vec<f64> {
+        let up_to = |bin: usize| {
+            if bin == 0 {
+                0.0
+            } else {
+                self.cumulative[bin * STEPS / bins - 1]
+            }
+        };
+        (0..bins)
+            .map(|bin| self.number_density * (up_to(bin + 1) - up_to(bin)))
+            .collect()
+    }
+
+    /// Diameters of the profiles, and the slice each is on.
+    pub fn profiles(&self, seed: u64) -> (Vec<f64>, Vec<f64>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let expected = self.number_density * SIDE.powi(3);
+        let count = Poisson::new(expected).map_or(0.0, |of| of.sample(&mut rng));
+        let offset: f64 = rng.random();
+        let (mut profiles, mut cut) = (Vec::new(), Vec::new());
+        let mut left = count;
+        while left > 0.0 {
+            left -= 1.0;
+            let diameter = self.draw(&mut rng);
+            let height = SIDE * rng.random::<f64>();
+            for plane in 0..PLANES {
+                let apart = (height - (plane as f64 + offset) * SIDE / PLANES as f64).abs();
+                let chord = diameter.powi(2) - 4.0 * apart.min(SIDE - apart).powi(2);
+                if chord > 0.0 {
+                    profiles.push(chord.sqrt());
+                    cut.push(diameter);
+                }
+            }
+        }
+        (profiles, cut)
+    }
+}
+
+/// |error of the total| over it, and L1 distances of the histograms normalised by number and by volume.
+pub fn scores(found: &[f64], truth: &[f64]) -> [f64; 3] {
+    let bins = truth.len() as f64;
+    let normalised = |values: Vec<f64>| {
+        let whole: f64 = values.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        values.into_iter().map(|value| value / whole).collect::<Vec<_>>()
+    };
+    let volume = |values: &[f64]| {
+        let cube = |j: usize| {
+            let (a, b) = (j as f64 / bins, (j as f64 + 1.0) / bins);
+            0.25 * (a + b) * (a * a + b * b)
+        };
+        normalised(values.iter().enumerate().map(|(j, value)| value * cube(j)).collect())
+    };
+    let apart = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| (a - b).abs()).sum::<f64>();
+    let (sum, whole): (f64, f64) = (found.iter().sum(), truth.iter().sum());
+    [
+        (sum / whole - 1.0).abs(),
+        apart(normalised(found.to_vec()), normalised(truth.to_vec())),
+        apart(volume(found), volume(truth)),
+    ]
+}

@@ -9,23 +9,28 @@
 //!
 //! is solved for the particles N_V per unit volume. Kernels are taken as given: from `stereology-kmatrix`, or made by hand as below. Results are
 //! absolute, never only a normalised histogram, and carry what is needed to judge them: refolded counts, deviance, condition number, clamped
-//! bins, intervals, and [`Finding`]s for the symptoms the paper names.
+//! bins, bias-corrected intervals, cross-checks, and [`Finding`]s for the symptoms the paper names. What is not known is sought in the counts too: the
+//! largest size, a capping angle ([`likely_parameter`]), shares of types ([`unknown_fractions`]); where they do not tell, that is the answer.
 //!
 //! # Spheres, by hand
 //!
 //! ```
-//! use nalgebra::DMatrix;
-//! use stereology_unfold::{Kernel, ProfileCounts, SizeBins, UnfoldOptions, equal_edges, unfold};
+//! use stereology_unfold::{Bootstrap, ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, divided_edges, equal_edges, unfold};
 //!
+//! // Reported in five bins, fitted on forty, with profiles counted in a hundred.
 //! let edges = equal_edges(1.0, 5);
-//! let share = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt(); // of a sphere's profiles below x diameters
-//! let matrix = DMatrix::from_fn(5, 5, |i, j| edges[j + 1] * (share(edges[i + 1] / edges[j + 1]) - share(edges[i] / edges[j + 1])));
-//! let spheres = Kernel::new(matrix, SizeBins::upper_edge(&edges)?, std::f64::consts::PI / 6.0)?;
+//! let bins = SizeBins::integrated(&divided_edges(&edges, 40, 0.0))?.reported_in(&edges)?;
+//! let profile_edges = divided_edges(&edges, 100, 0.0);
+//! // The share of a sphere's profiles below x diameters; its mean caliper is its diameter; nothing is lost at the rim.
+//! let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
+//! let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, std::f64::consts::PI / 6.0)?;
 //!
 //! let diameters = [0.31, 0.42, 0.55, 0.58, 0.66, 0.71, 0.74, 0.78, 0.79, 0.80];
-//! let counts = ProfileCounts::from_sizes(&diameters, None, &edges, 25.0)?;
-//! let found = unfold(&counts, &spheres, &UnfoldOptions::default())?;
+//! let counts = ProfileCounts::from_sizes(&diameters, None, &profile_edges, 25.0)?;
+//! let found = unfold(&counts, &spheres, &UnfoldOptions::default().with_bootstrap(Bootstrap::default()))?;
 //! assert!(found.volume_fraction.value > 0.1 && found.volume_fraction.value < 0.3);
+//! let interval = found.total.interval.ok_or("no interval")?;
+//! assert!(interval.lower <= found.total.value && found.total.value <= interval.upper);
 //! for finding in &found.findings {
 //!     println!("{}: {finding}", finding.code());
 //! }

@@ -263,7 +263,6 @@ impl Synthesize {
         let pixel = synthesis.details.residual.voxel;
         let sides: [f64; 3] = packing.sides().into();
         let mut unfolded = unfold::figures(&synthesis.densities.all, self.unfold.kernel_name());
-        unfolded.push(("profile_edges", json!(synthesis.densities.profile_edges)));
         unfolded.push((
             "size_and_colour_p_value",
             json!(synthesis.densities.association.p_value),

@@ -113,6 +113,94 @@ fn profiles_of_one_size_of_sphere() {
     );
 }
 
+/// The choices of the model from the data, and what the answer holds beside the densities.
+#[test]
+fn unfolding_finds_what_is_not_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = path(&folder, "profiles.csv");
+    // Spheres of diameters 0.3 to 1, one of each of 40, cut at 25 depths; ten slices.
+    let rows: String = (0..1000)
+        .filter_map(|k| {
+            let size = 0.3 + 0.7 * (f64::from(k % 40) + 0.5) / 40.0;
+            let depth = (f64::from(k / 40) + 0.5) / 50.0;
+            let chord = size * size - 4.0 * depth * depth;
+            (chord > 0.0).then(|| format!("{},{}\n", chord.sqrt(), k % 10))
+        })
+        .collect();
+    fs::write(&table, format!("size,slice\n{rows}")).unwrap();
+    let area = ["unfold", &table, "--area", "1000"];
+    let run = |more: &[&str]| answer(&[&area[..], more].concat());
+    let found = run(&[
+        "--bins",
+        "8",
+        "--max-size",
+        "likelihood",
+        "--bootstrap",
+        "60",
+        "--resample",
+        "slices",
+    ]);
+    let largest = found["max_size"]["value"].as_f64().unwrap();
+    assert!((largest - 1.0).abs() < 0.05, "{largest}");
+    assert!(
+        (found["total"].as_f64().unwrap() - 1.0).abs() < 0.1,
+        "{}",
+        found["total"]
+    );
+    let list = |value: &serde_json::Value| value.as_array().unwrap().len();
+    assert_eq!(
+        (
+            list(&found["observed"]),
+            list(&found["refolded"]),
+            list(&found["passing"]["lower"])
+        ),
+        (8, 8, 9)
+    );
+    assert_eq!(list(&found["by_volume"]["percentiles"]["value"]), 5);
+    assert!(found["surface_density_lower"].as_f64().unwrap() < found["surface_density"].as_f64().unwrap());
+    let check = &found["checks"]["area_fraction"];
+    assert!((check["observed"].as_f64().unwrap() / check["expected"].as_f64().unwrap() - 1.0).abs() < 0.1);
+    let capped = run(&["--capping-angle", "fit"]);
+    assert!(capped["capping_angle"]["value"].as_f64().unwrap() < 30.0);
+    assert!(
+        run(&["--bins", "auto", "--max-size", "corrected"])["edges"]
+            .as_array()
+            .unwrap()
+            .len()
+            > 4
+    );
+    assert_eq!(list(&run(&["--spacing", "phi", "--min-size", "0.25"])["edges"]), 6);
+    for method in ["penalised", "sparse", "em", "ems", "nnls", "paper"] {
+        assert_eq!(run(&["--method", method])["method"], method);
+    }
+    // Spheres and near-spheres show the same profiles: no pretending.
+    let refused = stereology(
+        &[
+            &area[..],
+            &[
+                "--shape",
+                "sphere",
+                "--shape",
+                "ellipsoid:1,1,1.2",
+                "--unknown-fractions",
+            ],
+        ]
+        .concat(),
+    );
+    assert!(refused.0 == 1 && refused.2.contains("do not tell"), "{refused:?}");
+    let two = path(&folder, "two.csv");
+    fs::write(&two, "size\n0.5\n0.7\n").unwrap();
+    let few = answer(&["unfold", &two, "--area", "10"]);
+    assert_eq!(few["edges"].as_array().unwrap().len(), 3);
+    assert!(
+        few["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|of| of["code"] == "fewer-bins")
+    );
+}
+
 #[test]
 fn labelled_types_are_unfolded_apart() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use stereology::anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
-use stereology::unfold::{Method, UnfoldOptions};
+use stereology::unfold::{Method, ProfileCounts, UnfoldOptions, equal_edges, unfold};
 use stereology::volume::{Axis, Solid};
 
 proptest! {
@@ -44,6 +44,28 @@ proptest! {
         let found = particle_densities(&profiles, &types, &DensityOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
         prop_assert!((found.all.total.value / number_density - 1.0).abs() < 0.15, "{} {number_density}", found.all.total.value);
         prop_assert!((found.all.volume_fraction.value / fraction - 1.0).abs() < 0.15, "{} {fraction}", found.all.volume_fraction.value);
+    }
+
+    /// Exact counts of ellipsoids unfold to their densities, by least squares and by the paper's inverse.
+    #[test]
+    fn exact_counts_of_ellipsoids_give_exact_densities(
+        truth in prop::collection::vec(0.05..1.0_f64, 2..8),
+        middle in 0.5..1.0_f64,
+        least in 0.4..1.0_f64,
+    ) {
+        let types = ParticleTypes::parse(&[&format!("ellipsoid:1,{middle},{}", least * middle)]).unwrap();
+        let edges = equal_edges(1.0, truth.len());
+        for sizes in [Sizes::UpperEdge, Sizes::Integrated] {
+            let kernel = types.kernel(&edges, &edges, sizes).unwrap();
+            let counts = kernel.matrix() * nalgebra::DVector::from_column_slice(&truth) * 1e4;
+            let counts = ProfileCounts::from_counts(counts.as_slice(), &edges, 1e4).unwrap();
+            for method in [Method::Paper, Method::Nnls] {
+                let found = unfold(&counts, &kernel, &UnfoldOptions::default().with_method(method)).unwrap();
+                for (found, truth) in found.number_density.iter().zip(&truth) {
+                    prop_assert!((found.unwrap() - truth).abs() < 1e-6, "{found:?} not {truth}");
+                }
+            }
+        }
     }
 
     /// Whatever the bins, method and threshold, the particles drawn fill the box to the fraction asked for, exactly.

@@ -13,7 +13,7 @@ use stereology::unfold::{
 };
 
 use super::grain_size_tools::saltykov;
-use super::sphere_samples::{AREA, Diameters, FIGURE_7, Population, TWO_BANDS, scores};
+use super::sphere_samples::{AREA, BAND_ON_MODE, Diameters, FEW, FIGURE_7, Population, TWO_BANDS, scores};
 
 const BINS: usize = 10;
 const SEEDS: u64 = 200;
@@ -81,7 +81,7 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
         Estimator::new("auto", Method::Auto, Sizes::Integrated, None)?,
     ];
     let mut text = String::from("distribution,estimator,total,l1_number,l1_volume,sparse_chosen\n");
-    for of in FIGURE_7.iter().chain([&TWO_BANDS]) {
+    for of in FIGURE_7.iter().chain([&TWO_BANDS, &BAND_ON_MODE, &FEW]) {
         let population = of.population();
         let truth = population.densities(BINS);
         for estimator in &estimators {

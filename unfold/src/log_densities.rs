@@ -173,7 +173,6 @@ pub(crate) struct Peak {
     pub(crate) converged: bool,
 }
 
-const MOST_STEPS: usize = 60;
 /// Keeps logarithms of densities that no count and no neighbour holds from running away: a standard deviation of 10³.
 const RIDGE: f64 = 1e-6;
 /// No logarithm moves farther than this in a step.
@@ -193,7 +192,7 @@ pub(crate) fn climb(
     counts: &[f64],
     penalty: Penalty,
     start: &[f64],
-    last_gain: f64,
+    effort: Effort,
     room: &mut Workspace,
 ) -> Peak {
     let mut theta = start.to_vec();
@@ -201,7 +200,7 @@ pub(crate) fn climb(
     let mut trial = theta.clone();
     let (mut likelihood, mut value) = ascend(design, counts, penalty, &theta, room);
     let (mut iterations, mut log_determinant, mut converged) = (0, 0.0, false);
-    while iterations < MOST_STEPS && !converged {
+    while iterations < effort.most_steps && !converged {
         iterations += 1;
         score(design, counts, penalty, &theta, &mut step, room);
         if !room.information.factorise() {
@@ -211,7 +210,7 @@ pub(crate) fn climb(
         trial.copy_from_slice(&step);
         room.information.solve(&mut step);
         let gain = dot(&trial, &step);
-        converged = gain < last_gain;
+        converged = gain < effort.last_gain;
         let longest = step.iter().fold(0.0_f64, |longest, s| longest.max(s.abs()));
         let mut length = (LONGEST_STEP / longest).min(1.0);
         let risen = (0..12).any(|_| {
@@ -243,9 +242,30 @@ pub(crate) fn climb(
     }
 }
 
-impl Peak {
+/// How far to climb.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
     /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so what is left is far less.
-    pub(crate) const LAST_GAIN: f64 = 0.3;
+    last_gain: f64,
+    most_steps: usize,
+}
+
+impl Effort {
+    /// To the top.
+    pub(crate) const FULL: Self = Self {
+        last_gain: 0.1,
+        most_steps: 60,
+    };
+    /// As near as evidence and refits need: densities that run towards zero are left on their way.
+    pub(crate) const BRIEF: Self = Self {
+        last_gain: 1.0,
+        most_steps: 8,
+    };
+    /// One step, for the information at the start.
+    pub(crate) const STEP: Self = Self {
+        last_gain: f64::INFINITY,
+        most_steps: 1,
+    };
 }
 
 /// Log-likelihood and penalised log-likelihood at θ, with densities and expected counts left in `room`.

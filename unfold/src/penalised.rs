@@ -11,7 +11,7 @@
 //! Fits along λ = 10^k, k falling, and at half decades about the best, for r = 1, 2, 3: the logarithms of their densities are averaged with the evidence as
 //! weights (empirical Bayes with nothing chosen by hand).
 
-use crate::log_densities::{Design, Peak, Penalty, Workspace, climb};
+use crate::log_densities::{Design, Effort, Peak, Penalty, Workspace, climb};
 
 /// Spread of the logarithm of densities along the polynomials a penalty leaves free.
 const FREE_SPREAD: f64 = 1.0;
@@ -38,7 +38,6 @@ pub(crate) struct SmoothFit {
     /// Trace of information over information with penalty, at the best: parameters in effect.
     pub(crate) effective_parameters: f64,
     pub(crate) iterations: usize,
-    pub(crate) converged: bool,
 }
 
 /// Fits of one order and weight.
@@ -85,7 +84,6 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
         penalty,
         second_order,
         iterations: steps.iter().map(|step| step.peak.iterations).sum(),
-        converged: steps.iter().all(|step| step.peak.converged),
     }
 }
 
@@ -99,7 +97,7 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
     let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
     let mut step = |weight: f64, start: &[f64]| {
         let penalty = Penalty { order, weight };
-        let peak = climb(design, counts, penalty, start, Peak::LAST_GAIN, room);
+        let peak = climb(design, counts, penalty, start, Effort::BRIEF, room);
         let evidence = peak.value + 0.5 * (rank * weight.ln() - peak.log_determinant) + constant;
         Step {
             penalty,
@@ -135,7 +133,7 @@ pub(crate) fn level(design: &Design, counts: &[f64]) -> f64 {
 fn effective_parameters(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> f64 {
     let nodes = design.nodes();
     // One more step leaves the factor of I + λP at θ in the workspace; I itself is that less λP.
-    let _ = climb(design, counts, penalty, theta, f64::INFINITY, room);
+    let _ = climb(design, counts, penalty, theta, Effort::STEP, room);
     let mut rough = crate::cholesky::Symmetric::zeros(nodes);
     penalty.add_to(&mut rough);
     let mut trace = nodes as f64;

@@ -36,9 +36,15 @@ impl Replicates {
     /// g − b ± z σ      g: of the rough fit; b, σ: mean of the replicates less g, and their standard deviation; z: normal quantile
     /// ```
     ///
-    /// For slices σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. Widened to hold `value`, the estimate reported; not below
-    /// zero.
-    pub(crate) fn interval(&self, value: f64, deviation: Deviation, quantity: &dyn Fn(&[f64]) -> f64) -> Interval {
+    /// For slices σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. Widened to hold `value`, the estimate reported; from zero to
+    /// `most` at most.
+    pub(crate) fn interval(
+        &self,
+        value: f64,
+        most: f64,
+        deviation: Deviation,
+        quantity: &dyn Fn(&[f64]) -> f64,
+    ) -> Interval {
         let values: Vec<f64> = self.densities.iter().map(|densities| quantity(densities)).collect();
         let base = quantity(&self.base);
         let n = values.len() as f64;
@@ -60,7 +66,7 @@ impl Replicates {
         let reach = quantile * squared.sqrt();
         Interval {
             lower: (base - bias - reach).max(0.0).min(value),
-            upper: (base - bias + reach).max(value),
+            upper: (base - bias + reach).min(most).max(value),
         }
     }
 }

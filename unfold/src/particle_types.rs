@@ -105,12 +105,14 @@ pub fn unfold_types_with_progress(
             (0..reported).map(interval).collect()
         }),
         total: quantities.estimate(&|all| all.iter().sum()),
-        mean_size: quantities.estimate(&|all| moments.mean(&by_number(all), Weighing::Number)),
-        volume_fraction: quantities.estimate(&|all| moments.sum(&by_volume(all), 3)),
+        mean_size: quantities.estimate_up_to(moments.largest(), &|all| {
+            moments.mean(&by_number(all), Weighing::Number)
+        }),
+        volume_fraction: quantities.estimate_up_to(1.0, &|all| moments.sum(&by_volume(all), 3)),
         surface_density: surfaces
             .map(|surfaces| quantities.estimate(&|all| moments.sum(&weighed(all, &surfaces, bins), 2))),
-        distribution: describe(&moments, sizes.reported_edges(), |weighing, quantity| {
-            quantities.estimate(&|all| match weighing {
+        distribution: describe(&moments, sizes.reported_edges(), |weighing, most, quantity| {
+            quantities.estimate_up_to(most, &|all| match weighing {
                 Weighing::Number => quantity(&by_number(all)),
                 Weighing::Volume => quantity(&by_volume(all)),
             })

@@ -75,6 +75,11 @@ impl Moments {
         }
     }
 
+    /// The largest size.
+    pub(crate) fn largest(&self) -> f64 {
+        self.edges.last().copied().unwrap_or(0.0)
+    }
+
     /// Σ N ⟨D^power⟩.
     pub(crate) fn sum(&self, densities: &[f64], power: usize) -> f64 {
         densities.iter().zip(&self.powers[power]).map(|(n, m)| n * m).sum()
@@ -124,23 +129,28 @@ impl Moments {
     }
 }
 
-/// The distribution, with `estimate` giving a quantity of the densities its value and interval; where densities count by volume they are weighed as well.
+/// The distribution, with `estimate` giving a quantity of the densities, up to a limit, its value and interval; where densities count by volume they are weighed as well.
 pub(crate) fn describe(
     moments: &Moments,
     reported_edges: &[f64],
-    estimate: impl Fn(Weighing, &dyn Fn(&[f64]) -> f64) -> Estimate,
+    estimate: impl Fn(Weighing, f64, &dyn Fn(&[f64]) -> f64) -> Estimate,
 ) -> SizeDistribution {
     let percentiles = |weighing: Weighing| Percentiles {
-        mean: estimate(weighing, &|densities| moments.mean(densities, weighing)),
-        percentiles: SHARES
-            .map(|share| estimate(weighing, &|densities| moments.percentile(densities, weighing, share))),
+        mean: estimate(weighing, moments.largest(), &|densities| {
+            moments.mean(densities, weighing)
+        }),
+        percentiles: SHARES.map(|share| {
+            estimate(weighing, moments.largest(), &|densities| {
+                moments.percentile(densities, weighing, share)
+            })
+        }),
     };
     SizeDistribution {
         by_number: percentiles(Weighing::Number),
         by_volume: percentiles(Weighing::Volume),
         passing: reported_edges
             .iter()
-            .map(|&edge| estimate(Weighing::Volume, &|densities| moments.passing(densities, edge)))
+            .map(|&edge| estimate(Weighing::Volume, 1.0, &|densities| moments.passing(densities, edge)))
             .collect(),
     }
 }

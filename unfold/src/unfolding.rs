@@ -345,19 +345,24 @@ pub(crate) struct Quantities<'a> {
 
 impl Quantities<'_> {
     pub(crate) fn estimate(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
+        self.estimate_up_to(f64::INFINITY, quantity)
+    }
+
+    /// Of a quantity that cannot be larger than `most`: a share, a size.
+    pub(crate) fn estimate_up_to(&self, most: f64, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
         let value = quantity(self.densities);
         Estimate {
             value,
             interval: self
                 .replicates
-                .map(|replicates| replicates.interval(value, Deviation::Spread, quantity)),
+                .map(|replicates| replicates.interval(value, most, Deviation::Spread, quantity)),
         }
     }
 
     pub(crate) fn bin(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Option<Interval> {
         let value = quantity(self.densities);
         self.replicates
-            .map(|replicates| replicates.interval(value, Deviation::SpreadAndBias, quantity))
+            .map(|replicates| replicates.interval(value, f64::INFINITY, Deviation::SpreadAndBias, quantity))
     }
 }
 
@@ -390,17 +395,21 @@ fn result(
         let wide = nalgebra::DVector::from_column_slice(&densities);
         (kernel.matrix() * wide).iter().copied().collect()
     };
-    let volume_fraction = estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
+    let volume_fraction = quantities.estimate_up_to(1.0, &|densities| kernel.unit_volume() * moments.sum(densities, 3));
     let rows = problem.counts.len();
     Unfolding {
         edges: sizes.reported_edges().to_vec(),
         intervals: replicates.map(|_| intervals),
         total: estimate(&|densities| densities.iter().sum()),
-        mean_size: estimate(&|densities| moments.mean(densities, Weighing::Number)),
+        mean_size: quantities.estimate_up_to(moments.largest(), &|densities| {
+            moments.mean(densities, Weighing::Number)
+        }),
         surface_density: kernel
             .unit_surface()
             .map(|surface| estimate(&|densities| surface * moments.sum(densities, 2))),
-        distribution: describe(&moments, sizes.reported_edges(), |_, quantity| estimate(quantity)),
+        distribution: describe(&moments, sizes.reported_edges(), |_, most, quantity| {
+            quantities.estimate_up_to(most, quantity)
+        }),
         profiles: counts.profiles(),
         profile_edges: counts.edges().to_vec(),
         observed: counts.per_area(),

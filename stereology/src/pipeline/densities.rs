@@ -287,7 +287,8 @@ fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
         .windows(2)
         .find(|bin| bin[0] < threshold && threshold < bin[1]);
     match bin {
-        Some(bin) if bin[1] < SEEN * threshold => bin[1],
+        // Above the last edge there is nothing.
+        Some(bin) if bin[1] < SEEN * threshold && Some(&bin[1]) != size_edges.last() => bin[1],
         _ => threshold,
     }
 }

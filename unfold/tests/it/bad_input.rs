@@ -33,6 +33,32 @@ fn one_profile_and_equal_profiles_are_unfolded_with_a_warning() {
     }
 }
 
+/// One profile tells little, but no mean beyond the largest size and no share beyond the whole.
+#[test]
+fn intervals_stay_where_values_can_be() {
+    let (kernel, edges) = spheres::fine(&equal_edges(0.5, 1));
+    let lone = ProfileCounts::from_sizes(&[0.5], None, &edges, 0.2).unwrap();
+    let options = UnfoldOptions::default().with_bootstrap(Bootstrap::default());
+    let found = unfold(&lone, &kernel, &options).unwrap();
+    assert!(found.mean_size.interval.unwrap().upper <= 0.5);
+    assert!(found.volume_fraction.interval.unwrap().upper <= f64::max(1.0, found.volume_fraction.value));
+    assert!(
+        found
+            .distribution
+            .passing
+            .iter()
+            .all(|of| of.interval.unwrap().upper <= 1.0 + 1e-12)
+    );
+    assert!(
+        found
+            .distribution
+            .by_volume
+            .percentiles
+            .iter()
+            .all(|of| of.interval.unwrap().upper <= 0.5 + 1e-12)
+    );
+}
+
 #[test]
 fn what_does_not_fit_is_refused() {
     let edges = equal_edges(1.0, 5);

@@ -109,6 +109,9 @@ impl Unfold {
         let edges = fewer.clone().unwrap_or(edges);
         let (angle, likely_angle) =
             capping_angle(&measured, &types, choices.capping(), &edges, &options).at(&self.profiles)?;
+        if self.unknown_fractions && types.types().len() < 2 {
+            return Err(Failure::usage("--unknown-fractions needs two or more --shape"));
+        }
         let fractions = if self.unknown_fractions {
             let found = type_shares(&measured, &types, &edges, &options).at(&self.profiles)?;
             types = types.with_shares(&found.fractions).or_fail()?;

@@ -37,6 +37,10 @@ pub enum EdgeRule {
 
 impl EdgeRule {
     /// The rule's name in commands and files.
+    ///
+    /// ```
+    /// assert_eq!(stereology_unfold::EdgeRule::CountingFrame.name(), "frame");
+    /// ```
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

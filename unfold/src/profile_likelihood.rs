@@ -37,6 +37,25 @@ const DETAIL: usize = 12;
 /// # Errors
 ///
 /// [`UnfoldError::Range`] for a range that is none or in which no value can explain the profiles; errors of the kernels and the fit.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_unfold::{ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, equal_edges, likely_parameter};
+///
+/// // Spheres of one size, cut at even depths: which size?
+/// let profiles: Vec<f64> = (0..500).map(|i| 0.8 * (1.0 - ((f64::from(i) + 0.5) / 500.0_f64).powi(2)).sqrt()).collect();
+/// let bins = equal_edges(1.2, 240);
+/// let counts = ProfileCounts::from_sizes(&profiles, None, &bins, 100.0)?;
+/// let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
+/// let one_size = |size: f64| {
+///     let sizes = SizeBins::upper_edge(&[0.0, size]).map_err(|_| stereology_unfold::KernelError::Volume(size))?;
+///     capped_kernel(&law, 1.0, 0.0, &bins, sizes, 0.5)
+/// };
+/// let found = likely_parameter(&counts, &one_size, (0.6, 1.2), 0.9, &UnfoldOptions::default())?;
+/// assert!((found.value - 0.8).abs() < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn likely_parameter(
     counts: &ProfileCounts,
     kernel_of: &dyn Fn(f64) -> Result<Kernel, KernelError>,

@@ -36,6 +36,26 @@ const ROUNDS: usize = 3;
 ///
 /// [`UnfoldError::FractionsUnknowable`] if the interval of a fraction is wider than 0.5, so that the counts do not tell; [`UnfoldError::Bins`] without two
 /// kernels; and as [`unfold`](crate::unfold).
+///
+/// # Examples
+///
+/// ```
+/// use stereology_unfold::{ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, divided_edges, equal_edges, unknown_fractions};
+///
+/// // Bodies that nearly always show their largest section, and bodies that hardly ever do; a third of the first kind.
+/// let edges = equal_edges(1.0, 5);
+/// let bins = divided_edges(&edges, 50, 0.0);
+/// let kernel = |law: &dyn Fn(f64) -> f64| {
+///     let sizes = SizeBins::integrated(&divided_edges(&edges, 40, 0.0)).and_then(|sizes| sizes.reported_in(&edges));
+///     capped_kernel(law, 1.0, 0.0, &bins, sizes.map_err(|_| stereology_unfold::KernelError::Volume(0.0))?, 0.5)
+/// };
+/// let kinds = [kernel(&|x| x.powi(40))?, kernel(&|x| 1.0 - (1.0 - x).powi(6))?];
+/// let shown = kinds[0].matrix().column(30) * 1000.0 + kinds[1].matrix().column(30) * 2000.0;
+/// let counts = ProfileCounts::from_counts(shown.as_slice(), &bins, 100.0)?;
+/// let found = unknown_fractions(&counts, &kinds, 0.9, &UnfoldOptions::default())?;
+/// assert!((found.fractions[0] - 1.0 / 3.0).abs() < 0.05);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn unknown_fractions(
     counts: &ProfileCounts,
     kernels: &[Kernel],

@@ -255,6 +255,12 @@ const SIZE_BINS: usize = 40;
 
 impl UnfoldingBins {
     /// Bins for densities in the bins between `edges`, from a threshold (0: none) on.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
+    /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Auto, Sizes::Integrated);
+    /// assert_eq!((bins.profile_edges.len(), bins.size_edges.len()), (101, 41));
+    /// ```
     #[must_use]
     pub fn new(edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> Self {
         if method == Method::Paper {

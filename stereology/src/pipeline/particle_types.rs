@@ -106,6 +106,12 @@ impl ParticleTypes {
     /// # Errors
     ///
     /// [`ParticleTypesError::Share`] for a share that is negative or not finite, or if all are zero.
+    ///
+    /// ```
+    /// let types = stereology::pipeline::ParticleTypes::parse(&["sphere", "box:1,1,2"])?.with_shares(&[3.0, 1.0])?;
+    /// assert_eq!(types.types()[1].share, 0.25);
+    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
+    /// ```
     pub fn with_shares(mut self, shares: &[f64]) -> Result<Self, ParticleTypesError> {
         let whole: f64 = shares.iter().take(self.types.len()).sum();
         for (of, &share) in self.types.iter_mut().zip(shares) {

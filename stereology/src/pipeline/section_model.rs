@@ -78,6 +78,18 @@ impl Counted {
 /// # Errors
 ///
 /// [`DensityError`]: nothing counted, or as [`likely_parameter`].
+///
+/// ```
+/// use stereology::pipeline::{LargestSize, MeasuredProfiles, ParticleTypes, largest_particle};
+/// use stereology::unfold::UnfoldOptions;
+/// // Spheres of diameter 10, cut at even depths.
+/// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
+/// let types = ParticleTypes::parse(&["sphere"])?;
+/// let (size, _) = largest_particle(&profiles, &types, LargestSize::Corrected, &UnfoldOptions::default())?;
+/// assert!((size - 10.0).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn largest_particle(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,
@@ -114,6 +126,16 @@ impl ParticleTypes {
     /// # Errors
     ///
     /// [`DensityError`]: edges that make no bins, an angle that is none.
+    ///
+    /// ```
+    /// use stereology::kmatrix::Sizes;
+    /// use stereology::pipeline::{ParticleTypes, UnfoldingBins};
+    /// use stereology::unfold::Method;
+    /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Paper, Sizes::UpperEdge);
+    /// let kernel = ParticleTypes::parse(&["sphere"])?.capped_kernel(0.5, &bins, Sizes::UpperEdge)?;
+    /// assert!((kernel.matrix().column(1).sum() - 0.5_f64.cos()).abs() < 1e-9); // so many of a sphere's profiles are seen
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn capped_kernel(&self, angle: f64, bins: &UnfoldingBins, sizes: Sizes) -> Result<Kernel, DensityError> {
         if angle <= 0.0 {
             return Ok(self.kernel(&bins.profile_edges, &bins.size_edges, sizes)?);
@@ -151,6 +173,19 @@ impl ParticleTypes {
 /// # Errors
 ///
 /// [`DensityError`]: nothing counted, or as [`likely_parameter`].
+///
+/// ```
+/// use stereology::pipeline::{Capping, MeasuredProfiles, ParticleTypes, capping_angle};
+/// use stereology::unfold::UnfoldOptions;
+/// // Spheres of diameter 10, cut at even depths.
+/// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
+/// let types = ParticleTypes::parse(&["sphere"])?;
+/// let edges = [0.0, 2.0, 4.0, 6.0, 8.0, 10.0];
+/// let (angle, search) = capping_angle(&profiles, &types, Capping::Likelihood, &edges, &UnfoldOptions::default())?;
+/// assert!(angle < 0.3 && search.is_some_and(|search| search.interval.lower < 0.1)); // nothing is lost
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn capping_angle(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,
@@ -185,6 +220,21 @@ pub fn capping_angle(
 /// # Errors
 ///
 /// [`DensityError`]: nothing counted, or as [`unknown_fractions`]: often the profiles do not tell.
+///
+/// ```
+/// use stereology::pipeline::{MeasuredProfiles, ParticleTypes, type_shares};
+/// use stereology::unfold::UnfoldOptions;
+/// // Spheres of diameter 10, cut at even depths.
+/// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
+/// let types = ParticleTypes::parse(&["sphere", "ellipsoid:1,1,1.1"])?;
+/// // Either a share with an interval, or the word that the profiles do not tell.
+/// match type_shares(&profiles, &types, &[0.0, 5.0, 10.0], &UnfoldOptions::default()) {
+///     Ok(shares) => assert!((shares.fractions.iter().sum::<f64>() - 1.0).abs() < 1e-9),
+///     Err(error) => assert!(error.to_string().contains("do not tell")),
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn type_shares(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,

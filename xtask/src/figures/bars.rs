@@ -64,12 +64,18 @@ fn draw_panel(
                 .map(|(i, v)| of.errors.map_or(*v, |e| e[i].1.max(*v)))
         })
         .fold(1e-300, f64::max);
+    // The legend stands above the bars, a line a series.
+    let headroom = if panel.series.len() > 1 {
+        1.08 + 0.16 * panel.series.len() as f64
+    } else {
+        1.08
+    };
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .caption(panel.title, ("sans-serif", 17).into_font().color(&INK))
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(0.0..1.0, 0.0..if panel.series.len() > 1 { 1.4 } else { 1.08 } * top)?;
+        .build_cartesian_2d(0.0..1.0, 0.0..headroom * top)?;
     chart
         .configure_mesh()
         .disable_x_mesh()

@@ -144,7 +144,7 @@ pub fn particle_densities(
         min_size: (threshold > 0.0).then_some(threshold),
         ..options.unfold
     };
-    let fit_bins = UnfoldingBins::new(&edges, threshold, options.unfold.method, options.sizes);
+    let fit_bins = types.unfolding_bins(&edges, threshold, options.unfold.method, options.sizes);
     let (angle, _) = capping_angle(profiles, types, options.capping, &edges, &unfolding)?;
     let kernel = reported(types.capped_kernel(angle, &fit_bins, options.sizes)?, &edges)?;
     let unfold_these = |places: &[usize], options: &UnfoldOptions| {
@@ -162,7 +162,7 @@ pub fn particle_densities(
     // What the findings would be in fewer bins, to name the number that cures them.
     let in_fewer = |bins: usize| -> Vec<Finding> {
         let edges = equal_edges(edges[edges.len() - 1], bins);
-        let bins = UnfoldingBins::new(&edges, threshold, unfolding.method, options.sizes);
+        let bins = types.unfolding_bins(&edges, threshold, unfolding.method, options.sizes);
         let found = || {
             let kernel = types.capped_kernel(angle, &bins, options.sizes)?;
             let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
@@ -276,6 +276,41 @@ impl UnfoldingBins {
                 Sizes::UpperEdge => edges.to_vec(),
             },
         }
+    }
+}
+
+/// The highest profile bin is widened until it holds this share of the profiles of the largest particles. A body's largest section may hardly ever be met (for
+/// a mesh: never, by any plane that was tried), and a profile there would not be explained, or count for far too many particles.
+const TOP_SHARE: f64 = 0.01;
+
+impl ParticleTypes {
+    /// [`UnfoldingBins::new`] with the highest profile bin so wide that every type shows profiles in it.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
+    /// let edges = [0.0, 0.5, 1.0];
+    /// let top = |shape: &str| {
+    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.0, Method::Auto, Sizes::Integrated);
+    ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
+    /// };
+    /// assert_eq!(top("sphere")?, 0.99);
+    /// assert!(top("box:1,1,2")? < 0.99); // hardly ever cut through two opposite edges
+    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
+    /// ```
+    #[must_use]
+    pub fn unfolding_bins(&self, edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> UnfoldingBins {
+        let mut bins = UnfoldingBins::new(edges, threshold, method, sizes);
+        let (Some(&largest), false) = (edges.last(), method == Method::Paper) else {
+            return bins;
+        };
+        let shown = |edge: f64| {
+            let shares = self.types().iter().map(|of| 1.0 - of.law().cdf(edge / largest));
+            shares.fold(1.0, f64::min) >= TOP_SHARE
+        };
+        let inner = bins.profile_edges.len() - 1;
+        let kept = (1..inner).rev().find(|&k| shown(bins.profile_edges[k])).unwrap_or(0);
+        bins.profile_edges.drain(kept + 1..inner);
+        bins
     }
 }
 

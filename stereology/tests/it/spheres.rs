@@ -93,3 +93,28 @@ proptest! {
         prop_assert_eq!(drawn.period.sides(), Vector3::repeat(drawn.period.sides().x));
     }
 }
+
+/// The largest section of a mesh is hardly ever met, and still the largest profile, whose size is taken for it, is explained.
+#[test]
+fn largest_profiles_of_meshes_are_explained() {
+    let types = ParticleTypes::parse(&["rock:1", "box:1,1,2"]).unwrap();
+    let count = 300;
+    let sizes: Vec<f64> = (0..count)
+        .map(|i| 3.0 + 20.0 * f64::from(i) / f64::from(count))
+        .collect();
+    let profiles = MeasuredProfiles {
+        weights: vec![1.0; sizes.len()],
+        categories: vec![0; sizes.len()],
+        area: 1e5,
+        sizes,
+        ..MeasuredProfiles::default()
+    };
+    for bins in [5, 16, 60] {
+        let options = DensityOptions {
+            bins,
+            ..DensityOptions::default()
+        };
+        let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
+        assert!(found.all.total.value > 0.0);
+    }
+}

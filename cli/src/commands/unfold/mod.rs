@@ -9,8 +9,8 @@ use clap::Args;
 use serde_json::{Value, json};
 use stereology::files::DensityRows;
 use stereology::pipeline::{
-    Capping, DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, capping_angle, largest_particle,
-    particle_densities, type_shares,
+    Capping, DensityOptions, MeasuredProfiles, ParticleTypes, capping_angle, largest_particle, particle_densities,
+    type_shares,
 };
 use stereology::unfold::{
     self, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold_types_with_progress,
@@ -228,7 +228,7 @@ impl Unfold {
         progress: unfold::Progress<'_>,
     ) -> Result<Found, Failure> {
         let threshold = options.min_size.unwrap_or(0.0);
-        let bins = UnfoldingBins::new(edges, threshold, options.method, self.choices.sizes());
+        let bins = types.unfolding_bins(edges, threshold, options.method, self.choices.sizes());
         let mut parts = Vec::new();
         for (kind, of) in types.types().iter().enumerate() {
             let own = || profiles.iter().filter(|profile| profile.kind == Some(kind));

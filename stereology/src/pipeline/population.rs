@@ -82,7 +82,7 @@ const FRACTION_TOLERANCE: f64 = 0.1;
 ///
 /// // Cuts through spheres of diameter 10, at evenly spread depths, on an area of 1e5: they fill 300 / 1e5 / 10 * pi 10³ / 6 = .157.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
-/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, min_size: 0.0, sizes };
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let spheres = ParticleTypes::parse(&["sphere"])?;
 /// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
 /// let densities = particle_densities(&profiles, &spheres, &options, &|_| ControlFlow::Continue(()))?;

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::hull::hull_mesh;
 use crate::measures;
+use crate::self_intersection::first_crossing;
 use crate::topology::{self, Neighbours};
 use crate::triangle_mesh::TriangleMesh;
 use crate::winding::ray_crossing;
@@ -13,7 +14,7 @@ use crate::winding::ray_crossing;
 /// Every edge is shared by exactly two triangles that agree about the outside. Safe repairs are made and listed by
 /// [`repairs`](Self::repairs); anything else is refused with its place. The mesh may consist of several bodies that share no edge:
 /// one inside another is a cavity of it (its triangles face the cavity), bodies apart are one particle in several pieces, measured
-/// together; bodies that interpenetrate are not found out here.
+/// together. A surface that cuts through itself, or through another of its bodies, is refused with the place.
 ///
 /// # Examples
 ///
@@ -174,6 +175,20 @@ pub enum MeshError {
         /// Its other end.
         to: [f64; 3],
     },
+    /// The surface cuts through itself: inside and outside mean nothing there.
+    #[error(
+        "the mesh cuts through itself: {count}{} pairs of triangles cross, the first are {} and {} (counted from 0) near {place:?}; unite \
+         the overlapping parts (a boolean union in a mesh editor)",
+        if *.count >= 1000 { " or more" } else { "" }, .triangles[0], .triangles[1]
+    )]
+    SelfIntersection {
+        /// The first two triangles that cross, counted after degenerate and duplicate triangles were dropped.
+        triangles: [usize; 2],
+        /// Where they cross.
+        place: [f64; 3],
+        /// How many pairs cross; the search ends at 1000.
+        count: usize,
+    },
     /// The triangles enclose no volume.
     #[error("the mesh encloses no volume (it is flat)")]
     ZeroVolume,
@@ -182,7 +197,7 @@ pub enum MeshError {
 impl TryFrom<TriangleMesh> for ClosedMesh {
     type Error = MeshError;
 
-    /// Checks, repairs what is safe, and measures. Cost: T log T.
+    /// Checks, repairs what is safe, and measures. Cost: T log T, and the pairs of triangles whose boxes overlap.
     fn try_from(mut mesh: TriangleMesh) -> Result<Self, MeshError> {
         let mut repairs = Vec::new();
         let mut note = |count: usize, repair: Repair| {
@@ -203,6 +218,13 @@ impl TryFrom<TriangleMesh> for ClosedMesh {
         let parts = topology::components(&neighbours);
         let count = topology::orient(&mut mesh, &mut neighbours, &parts)?;
         note(count, Repair::TurnedTriangles { count });
+        if let Some(crossing) = first_crossing(&mesh, &neighbours) {
+            return Err(MeshError::SelfIntersection {
+                triangles: crossing.triangles,
+                place: crossing.place.coords.into(),
+                count: crossing.count,
+            });
+        }
         let bodies = turn_inside_out(&mut mesh, &mut neighbours, &parts);
         note(bodies, Repair::TurnedInsideOut { bodies });
         Self::measure(mesh, neighbours, repairs, parts.len())

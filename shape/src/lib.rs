@@ -60,6 +60,7 @@ mod polygon;
 mod primitives;
 mod rock;
 mod section;
+mod self_intersection;
 #[cfg(feature = "io")]
 mod stl;
 mod topology;

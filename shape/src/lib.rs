@@ -60,6 +60,7 @@ mod polygon;
 mod primitives;
 mod rock;
 mod section;
+mod section_areas;
 mod self_intersection;
 #[cfg(feature = "io")]
 mod stl;
@@ -76,5 +77,6 @@ pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, rea
 pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
 pub use section::{SectionPolygon, section_polygons};
+pub use section_areas::SectionAreas;
 pub use triangle_mesh::TriangleMesh;
 pub use unit_body::UnitBody;

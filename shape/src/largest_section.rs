@@ -163,6 +163,8 @@ struct Search<'a> {
     slicer: Slicer<'a>,
     budget: &'a Budget,
     reach: f64,
+    /// While a climb looks around closely: the triangles its planes can meet.
+    nearby: Option<Vec<usize>>,
 }
 
 impl<'a> Search<'a> {
@@ -172,6 +174,7 @@ impl<'a> Search<'a> {
             slicer: Slicer::new(mesh),
             budget,
             reach: mesh.reach(&mesh.centroid()),
+            nearby: None,
         }
     }
 
@@ -244,6 +247,8 @@ impl<'a> Search<'a> {
         self.slicer.turn_to(&normal);
         let area = if self.mesh.is_convex() {
             self.slicer.total_area(offset)
+        } else if let Some(nearby) = &self.nearby {
+            largest(self.slicer.profiles(offset, nearby.iter().copied()))
         } else {
             largest(self.slicer.profiles(offset, 0..self.mesh.triangles().len()))
         };
@@ -259,6 +264,7 @@ impl<'a> Search<'a> {
         let mut failures = 0;
         while step > self.budget.finest && !(step < 2e-3 && best.area < 0.99 * to_beat) {
             let centre = best;
+            self.look_about(&centre, step);
             // Fresh axes each round: on the ridges of polyhedra fixed ones get stuck.
             turn += 2.4;
             let polls = POLLS.map(|[x, y, z]| self.near(&centre, turn, [x * step, y * step, z * step]));
@@ -286,7 +292,25 @@ impl<'a> Search<'a> {
                 step *= 0.5;
             }
         }
+        self.nearby = None;
         best
+    }
+
+    /// Finds the triangles that planes up to four steps from this one can meet, where those are few.
+    fn look_about(&mut self, centre: &Cut, step: f64) {
+        self.nearby = None;
+        let margin = 8.0 * step * self.reach;
+        if self.mesh.is_convex() || margin > 0.2 * self.reach {
+            return;
+        }
+        self.slicer.turn_to(&centre.normal);
+        let heights = &self.slicer.heights;
+        let spans = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|i| heights[i as usize] - centre.offset);
+            a.min(b).min(c) <= margin && a.max(b).max(c) >= -margin
+        };
+        let triangles = self.mesh.triangles().iter().enumerate();
+        self.nearby = Some(triangles.filter(|(_, corners)| spans(corners)).map(|(t, _)| t).collect());
     }
 
     /// The cut of a plane near `from`: turned by x and y about two axes in it, which `turn` turns, and shifted by z times the reach.

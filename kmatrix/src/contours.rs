@@ -1,9 +1,34 @@
 //! The contours of a section while it moves: which triangle belongs to which, what area each encloses, which are holes of which.
 
-use crate::depth_measure::{DepthMeasure, Quadratic};
-use crate::sweep::View;
+use crate::depth_measure::DepthMeasure;
+use crate::sweep::Plane;
 
 const NONE: u32 = u32::MAX;
+
+/// Signed area of a contour as a function of height, about some height: area + slope t + curvature t².
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct State {
+    pub(crate) area: f64,
+    pub(crate) slope: f64,
+    pub(crate) curvature: f64,
+}
+
+impl State {
+    fn at(&self, t: f64) -> f64 {
+        self.area + t * (self.slope + t * self.curvature)
+    }
+
+    fn advance(&mut self, t: f64) {
+        self.area = self.at(t);
+        self.slope += 2.0 * t * self.curvature;
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.area += other.area;
+        self.slope += other.slope;
+        self.curvature += other.curvature;
+    }
+}
 
 /// Contours by number; a number is given to a new contour when an old one ends.
 #[derive(Default)]
@@ -14,19 +39,30 @@ pub(crate) struct Contours {
     vacant: Vec<u32>,
     /// The contour of each triangle the section cuts.
     of_triangle: Vec<u32>,
-    /// Contours began, ended, split or merged since holes were last looked for.
+    /// Contours began or ended since holes were last looked for.
     changed: bool,
+    holes: u32,
+    /// The height up to which all profiles were measured at once.
+    settled: f64,
 }
 
 #[derive(Clone, Copy)]
 struct Contour {
-    area: Quadratic,
+    /// About `since`, the height up to which its profile has been measured.
+    state: State,
+    since: f64,
     /// A triangle on it.
     triangle: u32,
-    /// Its outer contour, if it is a hole.
-    hole_of: Option<u32>,
-    is_known: bool,
-    is_hole: bool,
+    kind: Kind,
+    exists: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Unknown,
+    Outer,
+    /// Of which outer contour.
+    Hole(u32),
 }
 
 impl Contours {
@@ -37,11 +73,17 @@ impl Contours {
         self.of_triangle.clear();
         self.of_triangle.resize(triangles, NONE);
         self.changed = false;
+        self.holes = 0;
+        self.settled = f64::NEG_INFINITY;
+    }
+
+    pub(crate) fn have_changed(&self) -> bool {
+        self.changed
     }
 
     /// The contour of a triangle that the section cuts.
-    pub(crate) fn of(&self, triangle: Option<u32>) -> u32 {
-        triangle.map_or(NONE, |triangle| self.of_triangle[triangle as usize])
+    pub(crate) fn of(&self, triangle: u32) -> u32 {
+        self.of_triangle[triangle as usize]
     }
 
     pub(crate) fn is_assigned(&self, triangle: u32) -> bool {
@@ -57,22 +99,18 @@ impl Contours {
         self.of_triangle[triangle as usize] = NONE;
     }
 
-    pub(crate) fn area(&self, contour: u32) -> Quadratic {
-        self.contours[contour as usize].area
+    pub(crate) fn set_state(&mut self, contour: u32, state: State) {
+        self.contours[contour as usize].state = state;
     }
 
-    pub(crate) fn set_area(&mut self, contour: u32, area: Quadratic) {
-        self.contours[contour as usize].area = area;
-    }
-
-    pub(crate) fn begin(&mut self) -> u32 {
+    pub(crate) fn begin(&mut self, since: f64, state: State) -> u32 {
         self.changed = true;
         let new = Contour {
-            area: Quadratic::default(),
+            state,
+            since,
             triangle: NONE,
-            hole_of: None,
-            is_known: false,
-            is_hole: false,
+            kind: Kind::Unknown,
+            exists: true,
         };
         let number = match self.vacant.pop() {
             Some(number) => {
@@ -88,87 +126,159 @@ impl Contours {
         number
     }
 
-    /// Ends a contour, if it has not ended yet.
+    /// Ends a contour, if it has not ended yet. Profiles must be settled up to its height.
     pub(crate) fn end(&mut self, contour: u32) {
+        let Some(ended) = self.contours.get_mut(contour as usize).filter(|contour| contour.exists) else {
+            return;
+        };
+        ended.exists = false;
+        self.holes -= u32::from(matches!(ended.kind, Kind::Hole(_)));
         if let Some(place) = self.present.iter().position(|&number| number == contour) {
             self.present.swap_remove(place);
+        }
+        // Its number is not given away before the holes it had are looked at.
+        self.changed = true;
+        if self.holes == 0 {
             self.vacant.push(contour);
-            self.changed = true;
         }
     }
 
-    /// Adds the profiles between two heights to the measure.
-    pub(crate) fn measure(&mut self, view: &View<'_>, low: f64, high: f64, measure: &mut DepthMeasure) {
-        if self.changed {
-            self.find_holes(view, 0.5 * (low + high));
-            self.changed = false;
+    /// A regular vertex on a contour: its profile is measured up to there, and its curvature jumps.
+    pub(crate) fn bend(&mut self, contour: u32, height: f64, jump: f64, measure: &mut DepthMeasure) {
+        match self.contours[contour as usize].kind {
+            Kind::Hole(NONE) => self.advance_alone(contour, height, measure),
+            Kind::Hole(outer) => self.measure(outer, height, measure),
+            _ => self.measure(contour, height, measure),
         }
-        for &number in &self.present {
-            let contour = &self.contours[number as usize];
-            if contour.is_hole {
-                measure.moments.holes += high - low;
-                continue;
+        self.contours[contour as usize].state.curvature += jump;
+    }
+
+    /// Measures every profile up to a height at which contours begin or end.
+    #[allow(clippy::float_cmp, reason = "the same height, not one near it")]
+    pub(crate) fn settle(&mut self, height: f64, measure: &mut DepthMeasure) {
+        if self.settled == height {
+            return;
+        }
+        self.settled = height;
+        for i in 0..self.present.len() {
+            let number = self.present[i];
+            match self.contours[number as usize].kind {
+                Kind::Hole(NONE) => self.advance_alone(number, height, measure),
+                Kind::Hole(_) => {}
+                _ => self.measure(number, height, measure),
             }
-            let mut area = contour.area.coefficients();
-            for &other in &self.present {
-                if self.contours[other as usize].hole_of == Some(number) {
-                    let hole = self.contours[other as usize].area.coefficients();
-                    area = [0, 1, 2].map(|k| area[k] + hole[k]);
+        }
+    }
+
+    /// A hole that rounding left without a contour around it.
+    fn advance_alone(&mut self, hole: u32, height: f64, measure: &mut DepthMeasure) {
+        let hole = &mut self.contours[hole as usize];
+        let length = (height - hole.since).max(0.0);
+        hole.state.advance(length);
+        hole.since = height;
+        measure.moments.holes += length;
+    }
+
+    /// Adds the profile within an outer contour, from where it was last measured up to a height; moves it and its holes there.
+    fn measure(&mut self, outer: u32, height: f64, measure: &mut DepthMeasure) {
+        let contour = &mut self.contours[outer as usize];
+        let length = height - contour.since;
+        if length.is_nan() || length <= 0.0 {
+            return;
+        }
+        let mut profile = contour.state;
+        contour.state.advance(length);
+        contour.since = height;
+        if self.holes > 0 {
+            for i in 0..self.present.len() {
+                let hole = &mut self.contours[self.present[i] as usize];
+                if hole.kind == Kind::Hole(outer) {
+                    profile.add(&hole.state);
+                    hole.state.advance(length);
+                    hole.since = height;
+                    measure.moments.holes += length;
                 }
             }
-            measure.add_profile(area, low, high);
         }
+        measure.add_profile([profile.area, profile.slope, profile.curvature], length);
     }
 
     /// Tells holes (walked with the solid to the left, they have negative area) and gives each to the smallest outer contour around it.
-    fn find_holes(&mut self, view: &View<'_>, height: f64) {
+    ///
+    /// All profiles are settled at `low`; `middle` is halfway to the next vertex, just below which `plane` lies.
+    pub(crate) fn find_holes(&mut self, plane: &Plane<'_>, low: f64, middle: f64) {
+        self.changed = false;
+        let mut outers = 0;
         for &number in &self.present {
             let contour = &mut self.contours[number as usize];
-            if !contour.is_known {
-                contour.is_hole = signed_area(&view.polygon(contour.triangle, height)) < 0.0;
-                contour.is_known = true;
+            if contour.kind == Kind::Unknown {
+                let is_hole = contour.state.at(middle - low) < 0.0;
+                contour.kind = if is_hole { Kind::Hole(NONE) } else { Kind::Outer };
+                self.holes += u32::from(is_hole);
+            }
+            outers += u32::from(contour.kind == Kind::Outer);
+        }
+        if self.holes > 0 {
+            let mut outlines = Vec::new();
+            for i in 0..self.present.len() {
+                let number = self.present[i];
+                let orphan = match self.contours[number as usize].kind {
+                    Kind::Hole(NONE) => true,
+                    Kind::Hole(outer) => !self.contours[outer as usize].exists,
+                    _ => false,
+                };
+                if orphan {
+                    if outlines.is_empty() {
+                        outlines = self.outlines(plane, middle, outers > 1);
+                    }
+                    let owner = self.owner(number, &outlines, plane, middle);
+                    self.contours[number as usize].kind = Kind::Hole(owner);
+                }
             }
         }
-        if !self
-            .present
-            .iter()
-            .any(|&number| self.contours[number as usize].is_hole)
-        {
-            return;
-        }
-        let outlines: Vec<(u32, Vec<[f64; 2]>, f64)> = self
-            .present
-            .iter()
-            .filter(|&&number| !self.contours[number as usize].is_hole)
-            .map(|&number| {
-                let outline = view.polygon(self.contours[number as usize].triangle, height);
-                let area = signed_area(&outline);
-                (number, outline, area)
-            })
-            .collect();
-        for &number in &self.present {
-            if !self.contours[number as usize].is_hole {
-                continue;
-            }
-            let outline = view.polygon(self.contours[number as usize].triangle, height);
-            let area = -signed_area(&outline);
-            self.contours[number as usize].hole_of = outlines
-                .iter()
-                .filter(|(_, outer, outer_area)| {
-                    *outer_area > area && outline.iter().any(|point| is_inside(outer, point))
-                })
-                .min_by(|a, b| a.2.total_cmp(&b.2).then(a.0.cmp(&b.0)))
-                .map(|&(outer, _, _)| outer);
-        }
+        // Now that no hole names an ended contour, its number is free.
+        self.vacant.clear();
+        let numbers = 0..u32::try_from(self.contours.len()).unwrap_or(NONE);
+        self.vacant
+            .extend(numbers.filter(|&number| !self.contours[number as usize].exists));
     }
-}
 
-fn signed_area(polygon: &[[f64; 2]]) -> f64 {
-    let Some(&[x, y]) = polygon.first() else { return 0.0 };
-    let fans = polygon
-        .windows(2)
-        .map(|pair| (pair[0][0] - x) * (pair[1][1] - y) - (pair[0][1] - y) * (pair[1][0] - x));
-    0.5 * fans.sum::<f64>()
+    /// Number and polygon of every outer contour; without polygons where there is one only.
+    fn outlines(&self, plane: &Plane<'_>, height: f64, several: bool) -> Vec<(u32, Vec<[f64; 2]>)> {
+        let outers = self
+            .present
+            .iter()
+            .filter(|&&number| self.contours[number as usize].kind == Kind::Outer);
+        outers
+            .map(|&number| {
+                let triangle = self.contours[number as usize].triangle;
+                let outline = if several {
+                    plane.polygon(triangle, height)
+                } else {
+                    Vec::new()
+                };
+                (number, outline)
+            })
+            .collect()
+    }
+
+    /// The smallest outer contour around a hole.
+    fn owner(&self, hole: u32, outlines: &[(u32, Vec<[f64; 2]>)], plane: &Plane<'_>, height: f64) -> u32 {
+        if let [(only, _)] = outlines {
+            return *only;
+        }
+        let outline = plane.polygon(self.contours[hole as usize].triangle, height);
+        let area = |number: u32| {
+            let contour = &self.contours[number as usize];
+            contour.state.at(height - contour.since)
+        };
+        let around = outlines.iter().filter(|(number, outer)| {
+            area(*number) > -area(hole) && outline.iter().any(|point| is_inside(outer, point))
+        });
+        around
+            .min_by(|a, b| area(a.0).total_cmp(&area(b.0)).then(a.0.cmp(&b.0)))
+            .map_or(NONE, |&(number, _)| number)
+    }
 }
 
 /// Whether a ray from the point crosses the polygon an odd number of times.

@@ -42,6 +42,18 @@ pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> Distribution {
     Distribution::Table(Table::new(angles, values))
 }
 
+/// ⟨1 / w⟩ over directions: Carlson's elliptic integral R_F(a², b², c²).
+pub(crate) fn mean_reciprocal_half_width(semi_axes: [f64; 3]) -> f64 {
+    let unit = semi_axes.iter().copied().fold(0.0, f64::max);
+    let [mut x, mut y, mut z] = semi_axes.map(|a| (a / unit) * (a / unit));
+    // Duplication halves the spread of x, y, z until their mean says it all.
+    for _ in 0..60 {
+        let lambda = (x * y).sqrt() + (y * z).sqrt() + (z * x).sqrt();
+        [x, y, z] = [x, y, z].map(|t| 0.25 * (t + lambda));
+    }
+    ((x + y + z) / 3.0).sqrt().recip() / unit
+}
+
 /// Semi-axes over the shortest: 1 ≤ b ≤ a.
 struct Proportions {
     b: f64,

@@ -3,12 +3,13 @@
 use crate::depth_measure::{DepthMeasure, Moments};
 use crate::directions::half_sphere;
 use crate::distribution::{Distribution, Table};
-use crate::section_law::{Calipers, SectionLaw, standard_error};
+use crate::section_law::{Calipers, DEFAULT_CELLS, SectionLaw, Squares, standard_error};
 use crate::sweep::{Surface, Sweep};
 use nalgebra::UnitQuaternion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_shape::{Body, BodyKind, ClosedMesh, isotropic_rotation};
@@ -40,8 +41,8 @@ pub struct SectionOptions {
     pub bins: usize,
     /// Random rotations of the directions; fewer than 32 make the standard error itself uncertain.
     pub rotations: usize,
-    /// Cells of the table that holds F.
-    pub cells: usize,
+    /// Cells of the table that holds F, beside the nodes that make the matrix of `bins` exact; `None`: as many as the effort is worth.
+    pub cells: Option<usize>,
     /// Seed of the rotations.
     pub seed: u64,
 }
@@ -53,7 +54,7 @@ impl Default for SectionOptions {
             effort: Effort::Tolerance(1e-3),
             bins: 10,
             rotations: 32,
-            cells: crate::section_law::DEFAULT_CELLS,
+            cells: None,
             seed: 0,
         }
     }
@@ -127,7 +128,7 @@ pub enum SectionLawError {
 }
 
 /// Directions beyond which a tolerance counts as out of reach.
-const MOST_DIRECTIONS: usize = 1 << 22;
+const MOST_DIRECTIONS: f64 = 4e6;
 
 impl SectionLaw {
     /// The section law of any body: closed form for spheres and ellipsoids, exact in depth for meshes.
@@ -189,8 +190,8 @@ fn check(options: &SectionOptions) -> Result<(), SectionLawError> {
     if options.rotations < 2 {
         return too_few("random rotations", options.rotations, 2);
     }
-    if options.cells < 16 {
-        return too_few("cells of the table", options.cells, 16);
+    if let Some(cells @ ..16) = options.cells {
+        return too_few("cells of the table", cells, 16);
     }
     if options.bins == 0 {
         too_few("bins", 0, 1)
@@ -206,6 +207,24 @@ pub(crate) struct Sample {
     pub(crate) moments: Moments,
 }
 
+/// Cells of the table of F that an error is worth.
+fn cells(options: &SectionOptions) -> usize {
+    options.cells.unwrap_or(match options.effort {
+        Effort::Tolerance(tolerance) if tolerance >= 3e-3 => 64,
+        Effort::Tolerance(tolerance) if tolerance >= 5e-4 => 256,
+        _ => DEFAULT_CELLS,
+    })
+}
+
+/// Everything that is the same for all directions of a mesh.
+struct Task<'a> {
+    body: &'a Body,
+    surface: Surface<'a>,
+    nodes: Nodes,
+    bounds: Vec<f64>,
+    options: &'a SectionOptions,
+}
+
 fn of_mesh(
     body: &Body,
     mesh: &ClosedMesh,
@@ -214,83 +233,182 @@ fn of_mesh(
 ) -> Result<SectionLaw, SectionLawError> {
     let surface = Surface::new(mesh);
     let max_area = body.largest_section_area() / (surface.reach * surface.reach);
-    let bounds: Vec<f64> = Table::equal_angles(options.cells)
-        .iter()
-        .map(|theta| max_area * theta.sin().powi(2))
-        .collect();
-    let sample = |rotation: usize, count: usize| {
-        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-        rng.set_stream(rotation as u64);
-        let turn: UnitQuaternion<f64> = isotropic_rotation(&mut rng);
-        let mut sweep = Sweep::default();
-        let mut measure = DepthMeasure::new(bounds.clone());
-        for direction in half_sphere(count) {
-            sweep.run(&surface, &(turn * direction), &mut measure);
-        }
-        Sample::mean(&measure, count as f64)
-    };
-    let run = |count: usize, expected: f64| -> Result<Vec<Sample>, SectionLawError> {
-        let done = AtomicUsize::new(0);
-        (0..options.rotations)
-            .into_par_iter()
-            .map(|rotation| {
-                let sample = sample(rotation, count);
-                let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / options.rotations as f64;
-                if progress(share * expected).is_break() {
-                    Err(SectionLawError::Cancelled)
-                } else {
-                    Ok(sample)
-                }
-            })
-            .collect()
-    };
-    let finish = |samples: &[Sample], count: usize| {
-        let mean = |of: fn(&Moments) -> f64| {
-            samples.iter().map(|sample| of(&sample.moments)).sum::<f64>() / samples.len() as f64
-        };
-        let error = |of: fn(&Moments) -> f64| standard_error(samples.iter().map(|sample| of(&sample.moments)));
-        let chi = body.signed_mean_width();
-        let lengths = Calipers {
-            hull: body.mean_width(),
-            chi,
-            effective: chi + mean(|moments| moments.holes) * surface.reach,
-            effective_error: error(|moments| moments.holes) * surface.reach,
-        };
-        let apart = (mean(|moments| moments.profiles - moments.holes) - chi / surface.reach).abs();
-        // Heights are rounded to 2^-26 of the reach.
-        let chi_discrepancy = apart / error(|moments| moments.profiles - moments.holes).max(1e-7);
-        let area_unit = surface.reach * surface.reach;
-        let law = SectionLaw::from_samples(body, samples, lengths, area_unit, count * options.rotations)?;
-        Ok(SectionLaw { chi_discrepancy, ..law })
+    let nodes = Nodes::new(cells(options), options.bins);
+    let task = Task {
+        bounds: nodes.angles.iter().map(|theta| max_area * theta.sin().powi(2)).collect(),
+        body,
+        surface,
+        nodes,
+        options,
     };
     match options.effort {
         Effort::Directions(directions) => {
             let count = directions.div_ceil(options.rotations);
-            finish(&run(count, 1.0)?, count)
+            task.law(&task.samples(count, 1.0, progress)?, count)
         }
-        Effort::Tolerance(tolerance) => {
-            let mut count = 4;
-            let mut expected = 0.1;
-            loop {
-                let law = finish(&run(count, expected)?, count)?;
-                let reached = law.standard_error(options.bins);
-                if reached <= tolerance {
-                    return Ok(law);
-                }
-                // Errors fall like the -3/4 power of the directions for bodies with faces, faster for smooth ones.
-                let growth = (1.2 * (reached / tolerance).powf(4.0 / 3.0)).clamp(1.5, 16.0);
-                expected = if growth < 16.0 { 0.9 } else { 0.3 };
-                count = next_count(count, growth);
-                if count * options.rotations > MOST_DIRECTIONS {
-                    let directions = law.directions();
-                    return Err(SectionLawError::NotReached {
-                        reached,
-                        asked: tolerance,
-                        directions,
-                    });
-                }
+        Effort::Tolerance(tolerance) => task.within(tolerance, progress),
+    }
+}
+
+impl Task<'_> {
+    /// Lattices grow until the error of the matrix is within the tolerance.
+    fn within(&self, tolerance: f64, progress: Progress<'_>) -> Result<SectionLaw, SectionLawError> {
+        let rotations = self.options.rotations;
+        let (mut count, mut expected) = (4, 0.1);
+        loop {
+            let samples = self.samples(count, expected, progress)?;
+            let reached = self.nodes.largest_error(&samples);
+            if reached <= tolerance {
+                return self.law(&samples, count);
+            }
+            // Errors fall about as the number of directions for bodies with faces, faster for smooth ones.
+            let growth = (1.15 * reached / tolerance).powf(1.1);
+            let needed = growth * (count * rotations) as f64;
+            if needed.is_nan() || needed > MOST_DIRECTIONS {
+                return Err(SectionLawError::NotReached {
+                    reached,
+                    asked: tolerance,
+                    directions: count * rotations,
+                });
+            }
+            expected = if growth < 16.0 { 0.9 } else { 0.3 };
+            count = next_count(count, growth.clamp(1.3, 16.0));
+        }
+    }
+
+    /// One sample a rotation, each over `count` directions.
+    fn samples(&self, count: usize, expected: f64, progress: Progress<'_>) -> Result<Vec<Sample>, SectionLawError> {
+        let rotations = self.options.rotations;
+        let done = AtomicUsize::new(0);
+        (0..rotations)
+            .into_par_iter()
+            .map_init(
+                || Sweep::new(&self.surface),
+                |sweep, rotation| {
+                    let sample = self.sample(sweep, rotation, count, &|share| {
+                        progress(expected * (done.load(Ordering::Relaxed) as f64 + share) / rotations as f64)
+                    })?;
+                    done.fetch_add(1, Ordering::Relaxed);
+                    Ok(sample)
+                },
+            )
+            .collect()
+    }
+
+    fn sample(
+        &self,
+        sweep: &mut Sweep<'_>,
+        rotation: usize,
+        count: usize,
+        progress: &dyn Fn(f64) -> ControlFlow<()>,
+    ) -> Result<Sample, SectionLawError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.options.seed);
+        rng.set_stream(rotation as u64);
+        let turn: UnitQuaternion<f64> = isotropic_rotation(&mut rng);
+        let mut measure = DepthMeasure::new(self.bounds.clone());
+        for (k, direction) in half_sphere(count).enumerate() {
+            if k % 64 == 0 && progress(k as f64 / count as f64).is_break() {
+                return Err(SectionLawError::Cancelled);
+            }
+            sweep.run(&(turn * direction), &mut measure);
+        }
+        Ok(Sample::mean(&measure, count as f64))
+    }
+
+    fn law(&self, samples: &[Sample], count: usize) -> Result<SectionLaw, SectionLawError> {
+        let mean = |of: fn(&Moments) -> f64| {
+            samples.iter().map(|sample| of(&sample.moments)).sum::<f64>() / samples.len() as f64
+        };
+        let error = |of: fn(&Moments) -> f64| standard_error(samples.iter().map(|sample| of(&sample.moments)));
+        let (chi, reach) = (self.body.signed_mean_width(), self.surface.reach);
+        let lengths = Calipers {
+            hull: self.body.mean_width(),
+            chi,
+            effective: chi + mean(|moments| moments.holes) * reach,
+            effective_error: error(|moments| moments.holes) * reach,
+        };
+        let apart = (mean(|moments| moments.profiles - moments.holes) - chi / reach).abs();
+        // Heights are rounded, and where edges are level so are counts.
+        let chi_discrepancy = apart / error(|moments| moments.profiles - moments.holes).max(1e-7);
+        let directions = count * self.options.rotations;
+        let law = SectionLaw::from_samples(self.body, samples, &self.nodes.angles, lengths, reach, directions)?;
+        Ok(SectionLaw { chi_discrepancy, ..law })
+    }
+}
+
+/// The angles θ = asin x at which F is known, and where among them the ratios i / j of a matrix's bins are: there nothing is interpolated.
+pub(crate) struct Nodes {
+    pub(crate) angles: Vec<f64>,
+    bins: usize,
+    /// The node of ratio i / j, 1 ≤ i ≤ j, at (j − 1) j / 2 + i − 1; empty for many bins.
+    ratios: Vec<usize>,
+}
+
+/// More bins than this have more ratios than a table is worth.
+const MOST_EXACT_BINS: usize = 40;
+
+impl Nodes {
+    pub(crate) fn new(cells: usize, bins: usize) -> Self {
+        let mut angles = Table::equal_angles(cells);
+        let exact = bins <= MOST_EXACT_BINS;
+        let ratio = |i: usize, j: usize| if i == j { FRAC_PI_2 } else { (i as f64 / j as f64).asin() };
+        let pairs = || (1..=bins).flat_map(|j| (1..=j).map(move |i| (i, j)));
+        if exact {
+            angles.extend(pairs().map(|(i, j)| ratio(i, j)));
+            angles.sort_by(f64::total_cmp);
+            // 2 / 4 and 1 / 2 are the same bits; an equal angle this near would make a cell of nothing.
+            angles.dedup_by(|next, last| *next - *last < 1e-9);
+            let last = angles.len() - 1;
+            angles[last] = FRAC_PI_2;
+        }
+        let node = |angle: f64| {
+            let above = angles.partition_point(|&node| node < angle).min(angles.len() - 1);
+            if above > 0 && angle - angles[above - 1] < angles[above] - angle {
+                above - 1
+            } else {
+                above
+            }
+        };
+        let ratios = if exact { pairs().map(|(i, j)| node(ratio(i, j))).collect() } else { Vec::new() };
+        Self { angles, bins, ratios }
+    }
+
+    /// The largest standard error of the matrix.
+    fn largest_error(&self, samples: &[Sample]) -> f64 {
+        let count = samples.len() as f64;
+        let whole: Vec<f64> = samples.iter().map(|sample| sample.below[sample.below.len() - 1]).collect();
+        let mut largest = 0.0_f64;
+        let mut spread = |of: &dyn Fn(&Sample, f64) -> f64| {
+            let values = samples.iter().zip(&whole).map(|(sample, &whole)| of(sample, whole));
+            let mean = values.clone().sum::<f64>() / count;
+            let squares = values.map(|value| (value - mean) * (value - mean)).sum::<f64>();
+            largest = largest.max(squares);
+        };
+        if self.ratios.is_empty() {
+            // Many bins: differences of F over equal steps of x are at most those between nodes as far apart.
+            let table: Vec<usize> = (0..=self.bins)
+                .map(|i| self.angles.partition_point(|&angle| angle < (i as f64 / self.bins as f64).asin()))
+                .map(|node| node.min(self.angles.len() - 1))
+                .collect();
+            for pair in table.windows(2) {
+                spread(&|sample, whole| (sample.below[pair[1]] - sample.below[pair[0]]) / whole);
             }
         }
+        for j in 1..=self.bins {
+            let column = j * (j - 1) / 2;
+            if self.ratios.is_empty() {
+                break;
+            }
+            let size = j as f64 / self.bins as f64;
+            for i in 0..j {
+                let to = self.ratios[column + i];
+                let from = if i == 0 { None } else { Some(self.ratios[column + i - 1]) };
+                spread(&|sample, whole| {
+                    size * (sample.below[to] - from.map_or(0.0, |from| sample.below[from])) / whole
+                });
+            }
+        }
+        (largest / (count - 1.0) / count).sqrt()
     }
 }
 
@@ -308,6 +426,8 @@ impl Sample {
                 profiles: moments.profiles / count,
                 holes: moments.holes / count,
                 area: moments.area / count,
+                area_squared: moments.area_squared / count,
+                total_squared: moments.total_squared / count,
                 largest: moments.largest,
             },
         }
@@ -315,15 +435,15 @@ impl Sample {
 }
 
 impl SectionLaw {
-    /// A law from samples on equal angles; areas of the samples are in units of `area_unit`.
+    /// A law from samples at these angles; lengths of the samples are in units of `unit`.
     pub(crate) fn from_samples(
         body: &Body,
         samples: &[Sample],
+        angles: &[f64],
         lengths: Calipers,
-        area_unit: f64,
+        unit: f64,
         directions: usize,
     ) -> Result<Self, SectionLawError> {
-        let angles = Table::equal_angles(samples.first().map_or(1, |sample| sample.below.len() - 1));
         let mut tables = Vec::with_capacity(samples.len());
         for sample in samples {
             let whole = sample.below[sample.below.len() - 1];
@@ -340,14 +460,15 @@ impl SectionLaw {
             values[0] = 0.0;
             let last = values.len() - 1;
             values[last] = 1.0;
-            tables.push(Table::new(angles.clone(), values));
+            tables.push(Table::new(angles.to_vec(), values));
         }
         Ok(Self {
             distribution: Distribution::Table(Table::mean(&tables)),
             samples: tables,
             lengths,
             max_area: body.largest_section_area(),
-            largest_met: samples.iter().map(|sample| sample.moments.largest).fold(0.0, f64::max) * area_unit,
+            largest_met: samples.iter().map(|sample| sample.moments.largest).fold(0.0, f64::max) * unit * unit,
+            squares: Squares::of(samples, lengths, unit),
             volume: body.volume(),
             surface_area: body.surface_area(),
             directions,

@@ -78,6 +78,8 @@ struct Batch {
     areas: Vec<f64>,
     hits: usize,
     planes: usize,
+    /// Σ (area of the whole section)².
+    total_squared: f64,
 }
 
 impl SectionLaw {
@@ -163,7 +165,7 @@ impl SectionLaw {
             .map(|batch| count_below(batch, max_area, 2.0 * radius))
             .collect();
         let hits = batches.iter().map(|batch| batch.hits).sum();
-        let law = Self::from_samples(body, &samples, lengths, 1.0, hits)?;
+        let law = Self::from_samples(body, &samples, &Table::equal_angles(DEFAULT_CELLS), lengths, 1.0, hits)?;
         Ok(Self { max_area, ..law })
     }
 }
@@ -189,6 +191,7 @@ fn throw_planes(body: &Body, radius: f64, wanted: usize, rng: &mut ChaCha8Rng) -
         areas: Vec::with_capacity(wanted),
         hits: 0,
         planes: 0,
+        total_squared: 0.0,
     };
     while batch.hits < wanted {
         if batch.planes > PATIENCE * wanted {
@@ -198,6 +201,7 @@ fn throw_planes(body: &Body, radius: f64, wanted: usize, rng: &mut ChaCha8Rng) -
         let offset = centre.coords.dot(&normal) + radius * (2.0 * rng.random::<f64>() - 1.0);
         let areas = body.profile_areas(&normal, offset);
         batch.planes += 1;
+        batch.total_squared += areas.iter().sum::<f64>().powi(2);
         batch.hits += usize::from(!areas.is_empty());
         batch.areas.extend(areas);
     }
@@ -219,6 +223,8 @@ fn count_below(batch: &Batch, max_area: f64, span: f64) -> Sample {
         profiles: areas.len() as f64 * unit,
         holes: 0.0,
         area: areas.iter().sum::<f64>() * unit,
+        area_squared: areas.iter().map(|area| area * area).sum::<f64>() * unit,
+        total_squared: batch.total_squared * unit,
         largest: areas.last().copied().unwrap_or(0.0),
     };
     Sample { below, moments }

@@ -1,11 +1,13 @@
 //! One law gives every kernel: F(x), the share of profiles with √(A / A_max) ≤ x, and how many profiles there are.
 
+use crate::depth_measure::Moments;
 use crate::distribution::{Distribution, Table};
 use crate::ellipsoid;
+use crate::exact::Sample;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::PI;
-use stereology_shape::{Body, BodyError};
+use stereology_shape::{Body, BodyError, BodyKind};
 
 /// Cells of the table of F where the caller does not choose.
 pub(crate) const DEFAULT_CELLS: usize = 512;
@@ -44,6 +46,7 @@ pub struct SectionLaw {
     pub(crate) lengths: Calipers,
     pub(crate) max_area: f64,
     pub(crate) largest_met: f64,
+    pub(crate) squares: Squares,
     pub(crate) volume: f64,
     pub(crate) surface_area: f64,
     pub(crate) directions: usize,
@@ -58,6 +61,31 @@ pub(crate) struct Calipers {
     pub(crate) chi: f64,
     pub(crate) effective: f64,
     pub(crate) effective_error: f64,
+}
+
+/// Mean squares of areas over random sections, and their standard errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Squares {
+    pub(crate) profile: f64,
+    pub(crate) profile_error: f64,
+    /// ⟨A²⟩ of whole sections, over all planes: a length times an area squared.
+    pub(crate) total: f64,
+    pub(crate) total_error: f64,
+}
+
+impl Squares {
+    pub(crate) fn of(samples: &[Sample], lengths: Calipers, unit: f64) -> Self {
+        let count = samples.len() as f64;
+        let mean = |of: fn(&Moments) -> f64| samples.iter().map(|sample| of(&sample.moments)).sum::<f64>() / count;
+        let error = |of: fn(&Moments) -> f64| standard_error(samples.iter().map(|sample| of(&sample.moments)));
+        let fifth = unit.powi(5);
+        Self {
+            profile: mean(|moments| moments.area_squared) * fifth / lengths.effective,
+            profile_error: error(|moments| moments.area_squared) * fifth / lengths.effective,
+            total: mean(|moments| moments.total_squared) * fifth,
+            total_error: error(|moments| moments.total_squared) * fifth,
+        }
+    }
 }
 
 impl SectionLaw {
@@ -96,6 +124,11 @@ impl SectionLaw {
 
     fn closed_form(body: &Body, distribution: Distribution) -> Self {
         let width = body.mean_width();
+        // ∫ A² dh = (16/15) w A₀² with A₀ = V / (4 w / 3): (3/5) V² ⟨1 / w⟩.
+        let total = match body.kind() {
+            BodyKind::Ellipsoid { semi_axes } => 0.6 * body.volume().powi(2) * ellipsoid::mean_reciprocal_half_width(semi_axes),
+            _ => 1.2 * body.volume().powi(2) / width,
+        };
         Self {
             distribution,
             samples: Vec::new(),
@@ -107,6 +140,12 @@ impl SectionLaw {
             },
             max_area: body.largest_section_area(),
             largest_met: body.largest_section_area(),
+            squares: Squares {
+                profile: total / width,
+                profile_error: 0.0,
+                total,
+                total_error: 0.0,
+            },
             volume: body.volume(),
             surface_area: body.surface_area(),
             directions: 0,
@@ -253,6 +292,52 @@ impl SectionLaw {
     #[must_use]
     pub fn mean_profile_area(&self) -> f64 {
         self.volume / self.lengths.effective
+    }
+
+    /// Mean squared area of a profile, ⟨A²⟩ / H_eff.
+    #[must_use]
+    pub fn mean_square_profile_area(&self) -> f64 {
+        self.squares.profile
+    }
+
+    /// Standard error of the mean squared profile area; zero for closed forms.
+    #[must_use]
+    pub fn mean_square_profile_area_standard_error(&self) -> f64 {
+        self.squares.profile_error
+    }
+
+    /// Mean area of the section a plane that hits shows, all its profiles together: V / H_hull, exact.
+    #[must_use]
+    pub fn mean_section_area(&self) -> f64 {
+        self.volume / self.lengths.hull
+    }
+
+    /// Mean squared area of such a section, all its profiles together.
+    #[must_use]
+    pub fn mean_square_section_area(&self) -> f64 {
+        self.squares.total / self.lengths.hull
+    }
+
+    /// Its standard error; zero for closed forms.
+    #[must_use]
+    pub fn mean_square_section_area_standard_error(&self) -> f64 {
+        self.squares.total_error / self.lengths.hull
+    }
+
+    /// The body's self-energy ½ ∬ dx dy / |x − y|, which is the mean over directions of ∫ A² dh: two points of the body are in one random
+    /// plane as often as they are near each other.
+    ///
+    /// Unit cube: 0.94115632; ball of radius R: 16 π² R⁵ / 15.
+    ///
+    /// ```
+    /// use std::f64::consts::PI;
+    /// let ball = stereology_kmatrix::SectionLaw::sphere(2.0)?;
+    /// assert!((ball.self_energy() - 16.0 * PI * PI / 15.0).abs() < 1e-12);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    #[must_use]
+    pub fn self_energy(&self) -> f64 {
+        self.squares.total
     }
 
     /// Directions that were used in all, over all rotations; zero for closed forms, sections that hit for Monte Carlo.

@@ -1,27 +1,37 @@
 //! All sections across one direction at once: a sweep over the sorted vertices of a closed mesh.
 //!
-//! Between two consecutive vertex heights the section keeps its topology and every contour's area is a quadratic in the height: each triangle
-//! cut adds the area of the fan from the axis to its segment. A vertex changes only the triangles around it.
+//! Between two vertices of a contour its area is a quadratic of the height. Near a vertex the section changes by a polygon as large as the
+//! distance from it, so area and slope are continuous there and only the curvature jumps, by a sum over the triangles around the vertex.
+//! A contour is therefore three numbers that every vertex on it moves on; only where contours split or merge are they walked around anew.
 
-use crate::contours::Contours;
-use crate::depth_measure::{DepthMeasure, Quadratic};
+use crate::contours::{Contours, State};
+use crate::depth_measure::DepthMeasure;
 use nalgebra::Vector3;
-use stereology_shape::ClosedMesh;
+use stereology_shape::{ClosedMesh, SectionAreas};
 
-/// Heights are rounded to this part of the body's reach: rounding errors of nearly horizontal triangles (1 / Δh²) and of the heights balance.
-const HEIGHT_STEPS: f64 = (1_u64 << 26) as f64;
+/// A sweep whose areas do not add up to the volume to this part was spoilt by an edge that is all but level: it is repeated a hair aside.
+const MOST_DEFECT: f64 = 1e-7;
+/// How far aside, and how often, before the mesh itself must be at fault.
+const ASIDE: f64 = 1e-8;
+const ATTEMPTS: i32 = 4;
 
 /// A closed mesh about its centroid in units of its reach, with the triangles around every vertex.
 pub(crate) struct Surface<'a> {
     vertices: Vec<Vector3<f64>>,
-    pub(crate) triangles: &'a [[u32; 3]],
+    /// The area vector of each triangle.
+    areas: Vec<Vector3<f64>>,
+    triangles: &'a [[u32; 3]],
     /// Across edge k → k + 1 of each triangle.
-    pub(crate) neighbours: &'a [[u32; 3]],
-    /// Triangles around vertex v: `around[starts[v]..starts[v + 1]]`.
+    neighbours: &'a [[u32; 3]],
+    /// Corners around vertex v: `around[starts[v]..starts[v + 1]]`, each 4 × triangle + corner.
     starts: Vec<u32>,
     around: Vec<u32>,
     /// Vertices whose triangles form more than one fan.
     pinched: Vec<bool>,
+    /// Volume in units of the reach cubed.
+    volume: f64,
+    /// All sections of a convex mesh; totals of any.
+    totals: SectionAreas,
     convex: bool,
     /// The mesh's unit of length in ours.
     pub(crate) reach: f64,
@@ -29,51 +39,69 @@ pub(crate) struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     pub(crate) fn new(mesh: &'a ClosedMesh) -> Self {
-        let centre = mesh.centroid();
-        let offsets: Vec<Vector3<f64>> = mesh.vertices().iter().map(|vertex| vertex - centre).collect();
-        let reach = offsets.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let totals = SectionAreas::new(mesh);
+        let reach = totals.reach();
+        let vertices: Vec<Vector3<f64>> = mesh
+            .vertices()
+            .iter()
+            .map(|vertex| (vertex - totals.centre()) / reach)
+            .collect();
         let triangles = mesh.triangles();
-        let mut starts = vec![0_u32; offsets.len() + 1];
-        for vertex in triangles.iter().flatten() {
-            starts[*vertex as usize + 1] += 1;
-        }
-        for v in 1..starts.len() {
-            starts[v] += starts[v - 1];
-        }
-        let mut next = starts.clone();
-        let mut around = vec![0; 3 * triangles.len()];
-        for (triangle, corners) in (0_u32..).zip(triangles) {
-            for &vertex in corners {
-                around[next[vertex as usize] as usize] = triangle;
-                next[vertex as usize] += 1;
-            }
-        }
         let mut surface = Self {
-            vertices: offsets.iter().map(|offset| offset / reach).collect(),
+            vertices,
+            areas: Vec::new(),
             triangles,
             neighbours: mesh.neighbours(),
-            starts,
-            around,
+            starts: Vec::new(),
+            around: Vec::new(),
             pinched: Vec::new(),
+            volume: mesh.volume() / reach.powi(3),
+            totals,
             convex: mesh.is_convex(),
             reach,
         };
+        surface.list_corners();
+        let area = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|v| surface.vertices[v as usize]);
+            0.5 * (b - a).cross(&(c - a))
+        };
+        surface.areas = triangles.iter().map(area).collect();
         surface.pinched = (0..surface.vertices.len()).map(|v| surface.is_pinched(v)).collect();
         surface
     }
 
-    fn around(&self, vertex: usize) -> &[u32] {
-        &self.around[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    fn list_corners(&mut self) {
+        self.starts = vec![0; self.vertices.len() + 1];
+        for vertex in self.triangles.iter().flatten() {
+            self.starts[*vertex as usize + 1] += 1;
+        }
+        for v in 1..self.starts.len() {
+            self.starts[v] += self.starts[v - 1];
+        }
+        let mut next = self.starts.clone();
+        self.around = vec![0; 3 * self.triangles.len()];
+        for (triangle, corners) in (0_u32..).zip(self.triangles) {
+            for (corner, &vertex) in (0_u32..).zip(corners) {
+                self.around[next[vertex as usize] as usize] = 4 * triangle + corner;
+                next[vertex as usize] += 1;
+            }
+        }
+    }
+
+    fn around(&self, vertex: u32) -> &[u32] {
+        &self.around[self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize]
     }
 
     /// Whether walking from triangle to triangle around the vertex comes back before all were seen.
     fn is_pinched(&self, vertex: usize) -> bool {
-        let fan = self.around(vertex);
+        let fan = &self.around[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
         let Some(&start) = fan.first() else { return false };
+        let start = start / 4;
         let mut triangle = start;
         let mut steps = 0;
         loop {
-            let corner = self.corner(triangle, vertex);
+            let corners = self.triangles[triangle as usize];
+            let corner = corners.iter().position(|&v| v as usize == vertex).unwrap_or(0);
             triangle = self.neighbours[triangle as usize][corner];
             steps += 1;
             if triangle == start || steps > fan.len() {
@@ -81,312 +109,255 @@ impl<'a> Surface<'a> {
             }
         }
     }
-
-    /// Which corner (0, 1, 2) of the triangle the vertex is.
-    fn corner(&self, triangle: u32, vertex: usize) -> usize {
-        self.triangles[triangle as usize]
-            .iter()
-            .position(|&v| v as usize == vertex)
-            .unwrap_or(0)
-    }
 }
 
-/// One direction's view of a surface: heights, order, position in the plane, and the quadratics of the triangles. Kept between directions.
-#[derive(Default)]
-pub(crate) struct Sweep {
-    order: Vec<u64>,
-    rank: Vec<u32>,
-    /// (x, y, height) of each vertex.
-    pub(crate) placed: Vec<[f64; 3]>,
-    /// Quadratics of each triangle below and above its middle vertex.
-    pieces: Vec<[[f64; 3]; 2]>,
+/// One direction's view of a surface. Kept between directions.
+pub(crate) struct Sweep<'a> {
+    surface: &'a Surface<'a>,
+    totals: SectionAreas,
+    axes: [Vector3<f64>; 2],
+    heights: Vec<f64>,
+    order: Vec<(u64, u32)>,
+    /// Jump of the curvature at each vertex.
+    jumps: Vec<f64>,
+    /// What its corners 0, 1, 2 are to each triangle: two bits of a [`Role`] each.
+    roles: Vec<u8>,
     contours: Contours,
 }
 
 /// What a vertex is to a triangle around it.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Role {
-    Lowest,
-    Middle,
-    Highest,
-}
+type Role = u8;
+const LOWEST: Role = 0;
+const MIDDLE: Role = 1;
+const HIGHEST: Role = 2;
 
-impl Sweep {
-    /// Adds all sections across `direction` (a unit vector) to `measure`, in units of the surface's reach.
-    pub(crate) fn run(&mut self, surface: &Surface<'_>, direction: &Vector3<f64>, measure: &mut DepthMeasure) {
-        self.place(surface, direction);
-        if surface.convex {
-            self.sweep_convex(surface, measure);
-        } else {
-            self.sweep_contours(surface, measure);
+impl<'a> Sweep<'a> {
+    pub(crate) fn new(surface: &'a Surface<'a>) -> Self {
+        Self {
+            surface,
+            totals: surface.totals.clone(),
+            axes: [Vector3::x(), Vector3::y()],
+            heights: vec![0.0; surface.vertices.len()],
+            order: Vec::new(),
+            jumps: vec![0.0; surface.vertices.len()],
+            roles: vec![0; surface.triangles.len()],
+            contours: Contours::default(),
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Heights are within ±1: steps fit into 28 bits; indices are u32 already.
-    fn place(&mut self, surface: &Surface<'_>, direction: &Vector3<f64>) {
-        let [x, y] = plane_axes(direction);
-        self.placed.clear();
+    /// Adds all sections across `direction` (a unit vector) to `measure`, in units of the surface's reach.
+    pub(crate) fn run(&mut self, direction: &Vector3<f64>, measure: &mut DepthMeasure) {
+        let mut direction = *direction;
+        for attempt in 0..=ATTEMPTS {
+            measure.begin();
+            let defect = if self.surface.convex {
+                self.sweep_convex(&direction, measure)
+            } else {
+                self.sweep_contours(&direction, measure)
+            };
+            // Very thin bodies have volumes that rounding alone spoils: their sections count as they are.
+            if defect <= MOST_DEFECT || (attempt == ATTEMPTS && defect.is_finite()) {
+                break;
+            }
+            measure.undo();
+            let aside = Vector3::new(0.36, -0.48, 0.8) * (ASIDE * 10.0_f64.powi(attempt));
+            direction = (direction + aside).normalize();
+        }
+    }
+
+    fn sweep_convex(&mut self, direction: &Vector3<f64>, measure: &mut DepthMeasure) -> f64 {
+        self.totals.sweep(direction, |low, high, area| {
+            measure.add_profile(area, high - low);
+            measure.add_total(area, high - low);
+        })
+    }
+
+    fn sweep_contours(&mut self, direction: &Vector3<f64>, measure: &mut DepthMeasure) -> f64 {
+        let before = measure.moments.area;
+        self.totals
+            .sweep(direction, |low, high, area| measure.add_total(area, high - low));
+        self.place(direction);
+        let mut contours = std::mem::take(&mut self.contours);
+        contours.restart(self.surface.triangles.len());
+        let mut below = f64::INFINITY;
+        for i in 0..self.order.len() {
+            let vertex = self.order[i].1;
+            let height = self.heights[vertex as usize];
+            if height > below && contours.have_changed() {
+                contours.find_holes(&self.plane_below(vertex), below, 0.5 * (below + height));
+            }
+            below = height;
+            self.pass(vertex, &mut contours, measure);
+        }
+        self.contours = contours;
+        ((measure.moments.area - before) / self.surface.volume - 1.0).abs()
+    }
+
+    #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
+    fn place(&mut self, direction: &Vector3<f64>) {
+        self.axes = plane_axes(direction);
         self.order.clear();
-        for (v, vertex) in surface.vertices.iter().enumerate() {
-            let step = (vertex.dot(direction) * HEIGHT_STEPS).round();
-            self.placed.push([vertex.dot(&x), vertex.dot(&y), step / HEIGHT_STEPS]);
-            self.order.push((((step + 2.0 * HEIGHT_STEPS) as u64) << 32) | v as u64);
+        for (i, (vertex, height)) in (0_u32..).zip(self.surface.vertices.iter().zip(&mut self.heights)) {
+            *height = vertex.dot(direction);
+            self.order.push((rising_bits(*height), i));
         }
         // By height, then by index: a total order, so that level vertices are no special case.
         self.order.sort_unstable();
-        self.rank.clear();
-        self.rank.resize(self.order.len(), 0);
-        for (rank, key) in (0_u32..).zip(&self.order) {
-            self.rank[(key & 0xffff_ffff) as usize] = rank;
-        }
-        self.pieces.clear();
-        self.pieces.resize(surface.triangles.len(), [[0.0; 3]; 2]);
-    }
-
-    fn sweep_convex(&mut self, surface: &Surface<'_>, measure: &mut DepthMeasure) {
-        let mut area = Quadratic::default();
-        let mut below = f64::INFINITY;
-        for i in 0..self.order.len() {
-            let vertex = self.vertex(i);
-            let height = self.placed[vertex][2];
-            if height > below {
-                measure.add_profile(area.coefficients(), below, height);
-            }
-            below = height;
-            for &triangle in surface.around(vertex) {
-                self.exchange(surface, triangle, self.role(surface, triangle, vertex), &mut area);
-            }
+        self.jumps.fill(0.0);
+        for (t, (corners, area)) in self.surface.triangles.iter().zip(&self.surface.areas).enumerate() {
+            let [i, j, k] = corners.map(|v| v as usize);
+            let [a, b, c] = [i, j, k].map(|v| self.heights[v]);
+            let (d, e, f) = (b - a, c - b, a - c);
+            let scale = area.dot(direction) / (d * e * f);
+            self.jumps[i] += scale * e;
+            self.jumps[j] += scale * f;
+            self.jumps[k] += scale * d;
+            let lower = |p: f64, v: usize, q: f64, w: usize| u8::from(p < q || (p == q && v < w));
+            let (ij, jk, ki) = (lower(a, i, b, j), lower(b, j, c, k), lower(c, k, a, i));
+            // How many of the other two are below each.
+            self.roles[t] = ((1 - ij) + ki) | ((1 - jk) + ij) << 2 | ((1 - ki) + jk) << 4;
         }
     }
 
-    fn sweep_contours(&mut self, surface: &Surface<'_>, measure: &mut DepthMeasure) {
-        let mut contours = std::mem::take(&mut self.contours);
-        contours.restart(surface.triangles.len());
-        let mut below = f64::INFINITY;
-        for i in 0..self.order.len() {
-            let vertex = self.vertex(i);
-            let height = self.placed[vertex][2];
-            if height > below {
-                contours.measure(
-                    &View {
-                        surface,
-                        sweep: self,
-                        rank: self.rank[vertex],
-                    },
-                    below,
-                    height,
-                    measure,
-                );
-            }
-            below = height;
-            self.pass(surface, vertex, &mut contours);
-        }
-        self.contours = contours;
+    fn role(&self, corner: u32) -> Role {
+        self.roles[(corner / 4) as usize] >> (2 * (corner % 4)) & 3
     }
 
     /// Moves the section from just below a vertex to just above it.
-    fn pass(&mut self, surface: &Surface<'_>, vertex: usize, contours: &mut Contours) {
+    fn pass(&mut self, vertex: u32, contours: &mut Contours, measure: &mut DepthMeasure) {
+        let surface = self.surface;
         let fan = surface.around(vertex);
-        let (mut middles, mut lowest, mut highest) = (0, 0, 0);
-        for &triangle in fan {
-            match self.role(surface, triangle, vertex) {
-                Role::Lowest => lowest += 1,
-                Role::Middle => middles += 1,
-                Role::Highest => highest += 1,
+        let (height, jump) = (self.heights[vertex as usize], self.jumps[vertex as usize]);
+        let mut counts = [0_u32; 4];
+        let mut cut = None;
+        for &corner in fan {
+            let role = self.role(corner);
+            counts[role as usize] += 1;
+            if role != LOWEST {
+                cut = Some(corner / 4);
             }
         }
-        // Around the vertex the height passes its own as often as there are triangles with a corner on either side: 0 is an extremum, 2 a
-        // regular vertex, more a saddle.
-        let simple = !surface.pinched[vertex];
-        if simple && middles == 2 {
-            let contour = contours.of(fan
-                .iter()
-                .copied()
-                .find(|&t| self.role(surface, t, vertex) != Role::Lowest));
-            let mut area = contours.area(contour);
-            for &triangle in fan {
-                let role = self.role(surface, triangle, vertex);
-                self.exchange(surface, triangle, role, &mut area);
-                if role != Role::Highest {
-                    contours.assign(triangle, contour);
+        // Around the vertex the height passes its own as often as it is the middle of a triangle: 0 is an extremum, 2 a regular vertex,
+        // more a saddle.
+        let simple = !surface.pinched[vertex as usize];
+        match (counts[MIDDLE as usize], cut) {
+            (2, Some(cut)) if simple => {
+                let contour = contours.of(cut);
+                contours.bend(contour, height, jump, measure);
+                for &corner in fan {
+                    if self.role(corner) == LOWEST {
+                        contours.assign(corner / 4, contour);
+                    }
                 }
             }
-            contours.set_area(contour, area);
-            return;
-        }
-        if simple && middles == 0 && (lowest == 0 || highest == 0) {
-            if highest == 0 {
-                let contour = contours.begin();
-                let mut area = Quadratic::default();
-                for &triangle in fan {
-                    self.exchange(surface, triangle, Role::Lowest, &mut area);
-                    contours.assign(triangle, contour);
+            (0, None) if simple => {
+                contours.settle(height, measure);
+                let state = State {
+                    curvature: jump,
+                    ..State::default()
+                };
+                let contour = contours.begin(height, state);
+                for &corner in fan {
+                    contours.assign(corner / 4, contour);
                 }
-                contours.set_area(contour, area);
-            } else {
-                contours.end(contours.of(fan.first().copied()));
             }
-            return;
+            (0, Some(cut)) if simple && counts[LOWEST as usize] == 0 => {
+                contours.settle(height, measure);
+                contours.end(contours.of(cut));
+            }
+            _ => {
+                contours.settle(height, measure);
+                self.retrace(vertex, contours);
+            }
         }
-        self.retrace(surface, vertex, contours);
     }
 
     /// Contours split or merge: those through the vertex end, and what leaves it is walked around anew.
-    fn retrace(&mut self, surface: &Surface<'_>, vertex: usize, contours: &mut Contours) {
-        let fan = surface.around(vertex);
-        for &triangle in fan {
-            match self.role(surface, triangle, vertex) {
-                Role::Lowest => {
-                    self.exchange(surface, triangle, Role::Lowest, &mut Quadratic::default());
-                    contours.release(triangle);
-                }
-                Role::Middle | Role::Highest => {
-                    contours.end(contours.of(Some(triangle)));
-                    contours.release(triangle);
-                }
+    fn retrace(&mut self, vertex: u32, contours: &mut Contours) {
+        let fan = self.surface.around(vertex);
+        for &corner in fan {
+            if self.role(corner) != LOWEST {
+                contours.end(contours.of(corner / 4));
             }
+            contours.release(corner / 4);
         }
-        let view = View {
-            surface,
-            sweep: self,
-            rank: self.rank[vertex] + 1,
-        };
-        for &start in fan {
-            if self.role(surface, start, vertex) == Role::Highest || contours.is_assigned(start) {
+        let height = self.heights[vertex as usize];
+        let plane = self.plane_below(vertex + 1).at(height);
+        for &corner in fan {
+            let start = corner / 4;
+            if self.role(corner) == HIGHEST || contours.is_assigned(start) {
                 continue;
             }
-            let contour = contours.begin();
-            let mut area = Quadratic::default();
+            let contour = contours.begin(height, State::default());
+            let mut state = State::default();
             let mut triangle = start;
             loop {
                 contours.assign(triangle, contour);
-                area.add(self.pieces[triangle as usize][usize::from(view.is_past_middle(triangle))]);
-                triangle = view.next(triangle).0;
+                plane.add_fan(triangle, &mut state);
+                triangle = plane.next(triangle).0;
                 if triangle == start {
                     break;
                 }
             }
-            contours.set_area(contour, area);
+            contours.set_state(contour, state);
         }
     }
 
-    #[allow(clippy::cast_possible_truncation)] // The low half of the key is the index.
-    fn vertex(&self, place: usize) -> usize {
-        (self.order[place] & 0xffff_ffff) as usize
-    }
-
-    fn role(&self, surface: &Surface<'_>, triangle: u32, vertex: usize) -> Role {
-        let rank = self.rank[vertex];
-        let below = surface.triangles[triangle as usize]
-            .iter()
-            .filter(|&&v| self.rank[v as usize] < rank)
-            .count();
-        [Role::Lowest, Role::Middle, Role::Highest][below]
-    }
-
-    /// Adds or takes away what the triangle contributes to its contour's area when the section passes its vertex of that role.
-    fn exchange(&mut self, surface: &Surface<'_>, triangle: u32, role: Role, area: &mut Quadratic) {
-        match role {
-            Role::Lowest => {
-                let pieces = self.fans(surface.triangles[triangle as usize]);
-                self.pieces[triangle as usize] = pieces;
-                area.add(pieces[0]);
-            }
-            Role::Middle => {
-                let [lower, upper] = self.pieces[triangle as usize];
-                area.subtract(lower);
-                area.add(upper);
-            }
-            Role::Highest => area.subtract(self.pieces[triangle as usize][1]),
+    /// The plane just below a vertex.
+    fn plane_below(&self, vertex: u32) -> Plane<'_> {
+        let height = self.heights.get(vertex as usize).copied().unwrap_or(0.0);
+        Plane {
+            sweep: self,
+            height,
+            vertex,
         }
     }
+}
 
-    /// The signed area between the axis and the triangle's segment, as quadratics of the height below and above the middle vertex.
-    fn fans(&self, corners: [u32; 3]) -> [[f64; 3]; 2] {
-        let mut sorted = corners.map(|v| v as usize);
-        sorted.sort_unstable_by_key(|&v| self.rank[v]);
-        let [low, middle, high] = sorted.map(|v| self.placed[v]);
-        // Counter-clockwise seen from outside, the solid lies to the left of the step from the falling to the rising edge.
-        let first = corners
-            .map(|v| v as usize)
-            .iter()
-            .position(|&v| v == sorted[0])
-            .unwrap_or(0);
-        let sign = if corners[(first + 1) % 3] as usize == sorted[1] {
-            0.5
-        } else {
-            -0.5
-        };
-        let run = |from: [f64; 3], to: [f64; 3]| {
-            let height = to[2] - from[2];
-            [(to[0] - from[0]) / height, (to[1] - from[1]) / height]
-        };
-        // Segment at height h: from `apex + (h − apex_h) a` to `apex + (h − apex_h) b`.
-        let fan = |apex: [f64; 3], a: [f64; 2], b: [f64; 2]| {
-            let square = sign * (a[0] * b[1] - a[1] * b[0]);
-            let linear = sign * (apex[0] * (b[1] - a[1]) - apex[1] * (b[0] - a[0]));
-            let h = apex[2];
-            [h * (h * square - linear), linear - 2.0 * h * square, square]
-        };
-        // Between level vertices there is no offset to measure.
-        let long = if high[2] > low[2] {
-            run(low, high)
-        } else {
-            return [[0.0; 3]; 2];
-        };
-        [
-            if middle[2] > low[2] {
-                fan(low, long, run(low, middle))
-            } else {
-                [0.0; 3]
-            },
-            if high[2] > middle[2] {
-                fan(high, long, run(middle, high))
-            } else {
-                [0.0; 3]
-            },
-        ]
+/// A plane across the direction, between two vertices of the order.
+pub(crate) struct Plane<'a> {
+    sweep: &'a Sweep<'a>,
+    /// Vertices at this height are below the plane if their index is below `vertex`.
+    height: f64,
+    vertex: u32,
+}
+
+impl Plane<'_> {
+    fn at(self, height: f64) -> Self {
+        Self { height, ..self }
     }
-}
 
-/// The section just below the vertex of a rank.
-pub(crate) struct View<'a> {
-    surface: &'a Surface<'a>,
-    sweep: &'a Sweep,
-    rank: u32,
-}
-
-impl View<'_> {
+    #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
     fn is_below(&self, vertex: u32) -> bool {
-        self.sweep.rank[vertex as usize] < self.rank
-    }
-
-    fn is_past_middle(&self, triangle: u32) -> bool {
-        self.surface.triangles[triangle as usize]
-            .iter()
-            .filter(|&&v| self.is_below(v))
-            .count()
-            == 2
+        let height = self.sweep.heights[vertex as usize];
+        height < self.height || (height == self.height && vertex < self.vertex)
     }
 
     /// The next triangle along the contour, the solid to the left, and the edge in between (lower, upper vertex).
     pub(crate) fn next(&self, triangle: u32) -> (u32, [u32; 2]) {
-        let corners = self.surface.triangles[triangle as usize];
+        let corners = self.sweep.surface.triangles[triangle as usize];
         let below = corners.map(|v| self.is_below(v));
         let rising = (0..3).find(|&k| below[k] && !below[(k + 1) % 3]).unwrap_or(0);
         (
-            self.surface.neighbours[triangle as usize][rising],
+            self.sweep.surface.neighbours[triangle as usize][rising],
             [corners[rising], corners[(rising + 1) % 3]],
         )
     }
 
-    /// The corners of the contour through a triangle at a height.
+    /// (x, y, height) of a vertex.
+    fn placed(&self, vertex: u32) -> [f64; 3] {
+        let position = &self.sweep.surface.vertices[vertex as usize];
+        let [x, y] = &self.sweep.axes;
+        [position.dot(x), position.dot(y), self.sweep.heights[vertex as usize]]
+    }
+
+    /// The corners of the contour through a triangle, at a height up to the next vertex.
     pub(crate) fn polygon(&self, start: u32, height: f64) -> Vec<[f64; 2]> {
         let mut points = Vec::new();
         let mut triangle = start;
         loop {
             let (next, [low, high]) = self.next(triangle);
-            let (low, high) = (self.sweep.placed[low as usize], self.sweep.placed[high as usize]);
+            let (low, high) = (self.placed(low), self.placed(high));
             let t = if high[2] > low[2] {
                 ((height - low[2]) / (high[2] - low[2])).clamp(0.0, 1.0)
             } else {
@@ -399,6 +370,41 @@ impl View<'_> {
             }
         }
     }
+
+    /// Adds the signed area between the axis and the segment that the plane cuts from a triangle.
+    fn add_fan(&self, triangle: u32, state: &mut State) {
+        let corners = self.sweep.surface.triangles[triangle as usize];
+        let roles = self.sweep.roles[triangle as usize];
+        let place = |role: Role| (0..3).find(|k| roles >> (2 * k) & 3 == role).unwrap_or(0);
+        let (lowest, middle) = (place(LOWEST), place(MIDDLE));
+        let [low, mid, high] = [lowest, middle, place(HIGHEST)].map(|k| self.placed(corners[k]));
+        // Counter-clockwise seen from outside, the solid lies to the left of the step from the falling to the rising edge.
+        let sign = if (lowest + 1) % 3 == middle { 0.5 } else { -0.5 };
+        let run = |from: [f64; 3], to: [f64; 3]| {
+            let height = to[2] - from[2];
+            [(to[0] - from[0]) / height, (to[1] - from[1]) / height]
+        };
+        // The segment runs from `apex + t a` to `apex + t b`.
+        let (apex, b) = if self.is_below(corners[middle]) {
+            (high, run(mid, high))
+        } else {
+            (low, run(low, mid))
+        };
+        let a = run(low, high);
+        let t = self.height - apex[2];
+        let square = sign * (a[0] * b[1] - a[1] * b[0]);
+        let linear = sign * (apex[0] * (b[1] - a[1]) - apex[1] * (b[0] - a[0]));
+        state.area += t * (linear + t * square);
+        state.slope += linear + 2.0 * t * square;
+        state.curvature += square;
+    }
+}
+
+/// Bits that sort as the number does (finite numbers; -0 sorts below 0, to the same place).
+fn rising_bits(x: f64) -> u64 {
+    // -0 + 0 is 0.
+    let bits = (x + 0.0).to_bits();
+    bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 }
 }
 
 /// Two unit vectors that make a right-handed frame with the direction.

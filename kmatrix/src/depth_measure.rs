@@ -10,6 +10,8 @@ pub(crate) struct DepthMeasure {
     /// Length below bound k of pieces that cross it.
     crossing: Vec<f64>,
     pub(crate) moments: Moments,
+    /// Where the last bound was found.
+    near: usize,
     /// Everything as it was at [`begin`](Self::begin).
     kept: Kept,
 }
@@ -46,6 +48,7 @@ impl DepthMeasure {
             crossing: zeros,
             bounds,
             moments: Moments::default(),
+            near: 0,
             kept: Kept::default(),
         }
     }
@@ -91,7 +94,7 @@ impl DepthMeasure {
         self.moments.largest = self.moments.largest.max(most);
         // The last bound is A_max: everything is below it, should rounding lift a section above, too.
         let last = self.bounds.len() - 1;
-        let mut k = self.bounds[..last].partition_point(|&bound| bound < least);
+        let mut k = self.first_not_below(least);
         while k < last && self.bounds[k] < most {
             // The root on the monotone stretch; b and the root have the sign of the direction, so nothing cancels.
             let rise = self.bounds[k] - a;
@@ -106,6 +109,24 @@ impl DepthMeasure {
             k += 1;
         }
         self.from[k] += length;
+    }
+
+    /// The first bound that is not below an area: near the last one found as a rule, for areas are continuous.
+    fn first_not_below(&mut self, area: f64) -> usize {
+        let last = self.bounds.len() - 1;
+        let mut k = self.near;
+        for _ in 0..8 {
+            if k > 0 && self.bounds[k - 1] >= area {
+                k -= 1;
+            } else if k < last && self.bounds[k] < area {
+                k += 1;
+            } else {
+                self.near = k;
+                return k;
+            }
+        }
+        self.near = self.bounds[..last].partition_point(|&bound| bound < area);
+        self.near
     }
 
     /// Length of offsets with a profile of area up to each bound.

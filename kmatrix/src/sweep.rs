@@ -244,8 +244,9 @@ impl<'a> Sweep<'a> {
             (2, Some(cut)) if simple => {
                 let contour = contours.of(cut);
                 contours.bend(contour, height, jump, measure);
+                // Those it is the middle of, too: a contour remembers a triangle that is still cut.
                 for &corner in fan {
-                    if self.role(corner) == LOWEST {
+                    if self.role(corner) != HIGHEST {
                         contours.assign(corner / 4, contour);
                     }
                 }
@@ -365,7 +366,8 @@ impl Plane<'_> {
             };
             points.push([low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1])]);
             triangle = next;
-            if triangle == start {
+            // A walk around a closed mesh always comes back; the bound says so to the machine.
+            if triangle == start || points.len() > self.sweep.surface.triangles.len() {
                 return points;
             }
         }

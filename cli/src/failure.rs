@@ -58,8 +58,17 @@ impl Display for Failure {
 
 /// A body from its description; a description that is none is wrong usage, a mesh that cannot be used a failed run.
 pub fn body(spec: &str) -> Result<Body, Failure> {
-    Body::parse(spec).map_err(|error| match error {
-        BodyError::Length { .. } | BodyError::Numbers { .. } | BodyError::UnknownShape { .. } => Failure::usage(error),
+    body_welding(spec, None)
+}
+
+/// [`body`], where vertices of a mesh file nearer than `weld` to each other are joined.
+pub fn body_welding(spec: &str, weld: Option<f64>) -> Result<Body, Failure> {
+    Body::parse_welding(spec, weld.unwrap_or(0.0)).map_err(|error| match error {
+        BodyError::Length { .. }
+        | BodyError::Numbers { .. }
+        | BodyError::Roughness(_)
+        | BodyError::Exponent(_)
+        | BodyError::UnknownShape { .. } => Failure::usage(error),
         other => Failure::run(other),
     })
 }

@@ -14,7 +14,8 @@ fn mesh(triangles: TriangleMesh) -> Body {
 
 /// A torus with knobs: many saddles. 2 × around × across triangles.
 fn knobbly(across: u32, around: u32) -> TriangleMesh {
-    TriangleMesh::torus(2.0, 0.7, around, across).mapped(|p| p * (1.0 + 0.1 * (9.0 * p.x).sin() * (9.0 * p.y).sin() * (9.0 * p.z).cos()))
+    TriangleMesh::torus(2.0, 0.7, around, across)
+        .mapped(|p| p * (1.0 + 0.1 * (9.0 * p.x).sin() * (9.0 * p.y).sin() * (9.0 * p.z).cos()))
 }
 
 fn section_law(c: &mut Criterion) {
@@ -30,10 +31,18 @@ fn section_law(c: &mut Criterion) {
     let half_percent = SectionOptions::default().with_tolerance(5e-3);
     let chip = mesh(TriangleMesh::icosphere(1.0, 3).mapped(|p| Point3::new(p.x, 0.8 * p.y, 0.6 * p.z)));
     let bodies = [
-        ("cube_half_percent", Body::cuboid([1.0; 3]).expect("edges are positive"), half_percent),
+        (
+            "cube_half_percent",
+            Body::cuboid([1.0; 3]).expect("edges are positive"),
+            half_percent,
+        ),
         ("convex_1280_half_percent", chip.clone(), half_percent),
         ("convex_1280_hundredth_percent", chip, half_percent.with_tolerance(1e-4)),
-        ("torus_10000_half_percent", mesh(TriangleMesh::torus(2.0, 0.5, 100, 50)), half_percent),
+        (
+            "torus_10000_half_percent",
+            mesh(TriangleMesh::torus(2.0, 0.5, 100, 50)),
+            half_percent,
+        ),
         ("knobbly_10240_half_percent", mesh(knobbly(40, 128)), half_percent),
         ("knobbly_100000_half_percent", mesh(knobbly(125, 400)), half_percent),
     ];

@@ -107,6 +107,16 @@ pub enum SectionLawError {
         /// How many it takes.
         least: usize,
     },
+    /// Too many of something.
+    #[error("{what}: {given} given, at most {most} can be handled")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many were asked for.
+        given: usize,
+        /// How many can be.
+        most: usize,
+    },
     /// The tolerance was not reached with the largest number of directions.
     #[error(
         "a standard error of {reached} after {directions} directions, {asked} was asked for: ask for a larger tolerance"
@@ -235,7 +245,11 @@ fn of_mesh(
     let max_area = body.largest_section_area() / (surface.reach * surface.reach);
     let nodes = Nodes::new(cells(options), options.bins);
     let task = Task {
-        bounds: nodes.angles.iter().map(|theta| max_area * theta.sin().powi(2)).collect(),
+        bounds: nodes
+            .angles
+            .iter()
+            .map(|theta| max_area * theta.sin().powi(2))
+            .collect(),
         body,
         surface,
         nodes,
@@ -351,7 +365,13 @@ impl Nodes {
     pub(crate) fn new(cells: usize, bins: usize) -> Self {
         let mut angles = Table::equal_angles(cells);
         let exact = bins <= MOST_EXACT_BINS;
-        let ratio = |i: usize, j: usize| if i == j { FRAC_PI_2 } else { (i as f64 / j as f64).asin() };
+        let ratio = |i: usize, j: usize| {
+            if i == j {
+                FRAC_PI_2
+            } else {
+                (i as f64 / j as f64).asin()
+            }
+        };
         let pairs = || (1..=bins).flat_map(|j| (1..=j).map(move |i| (i, j)));
         if exact {
             angles.extend(pairs().map(|(i, j)| ratio(i, j)));
@@ -369,14 +389,21 @@ impl Nodes {
                 above
             }
         };
-        let ratios = if exact { pairs().map(|(i, j)| node(ratio(i, j))).collect() } else { Vec::new() };
+        let ratios = if exact {
+            pairs().map(|(i, j)| node(ratio(i, j))).collect()
+        } else {
+            Vec::new()
+        };
         Self { angles, bins, ratios }
     }
 
     /// The largest standard error of the matrix.
     fn largest_error(&self, samples: &[Sample]) -> f64 {
         let count = samples.len() as f64;
-        let whole: Vec<f64> = samples.iter().map(|sample| sample.below[sample.below.len() - 1]).collect();
+        let whole: Vec<f64> = samples
+            .iter()
+            .map(|sample| sample.below[sample.below.len() - 1])
+            .collect();
         let mut largest = 0.0_f64;
         let mut spread = |of: &dyn Fn(&Sample, f64) -> f64| {
             let values = samples.iter().zip(&whole).map(|(sample, &whole)| of(sample, whole));
@@ -387,7 +414,10 @@ impl Nodes {
         if self.ratios.is_empty() {
             // Many bins: differences of F over equal steps of x are at most those between nodes as far apart.
             let table: Vec<usize> = (0..=self.bins)
-                .map(|i| self.angles.partition_point(|&angle| angle < (i as f64 / self.bins as f64).asin()))
+                .map(|i| {
+                    self.angles
+                        .partition_point(|&angle| angle < (i as f64 / self.bins as f64).asin())
+                })
                 .map(|node| node.min(self.angles.len() - 1))
                 .collect();
             for pair in table.windows(2) {
@@ -402,7 +432,11 @@ impl Nodes {
             let size = j as f64 / self.bins as f64;
             for i in 0..j {
                 let to = self.ratios[column + i];
-                let from = if i == 0 { None } else { Some(self.ratios[column + i - 1]) };
+                let from = if i == 0 {
+                    None
+                } else {
+                    Some(self.ratios[column + i - 1])
+                };
                 spread(&|sample, whole| {
                     size * (sample.below[to] - from.map_or(0.0, |from| sample.below[from])) / whole
                 });

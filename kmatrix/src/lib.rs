@@ -52,12 +52,13 @@ mod ellipsoid;
 mod exact;
 mod kernel;
 mod monte_carlo;
+mod raster;
 mod saltikov;
 mod section_law;
 mod sweep;
 
 pub use exact::{Effort, Progress, SectionLawError, SectionOptions};
 pub use kernel::{Counting, EdgesError, Sizes};
-pub use monte_carlo::{LargestArea, MonteCarloOptions};
-pub use saltikov::{BinCountError, SphereKernel, profiles_per_area, scale};
+pub use monte_carlo::{LargestArea, MonteCarloOptions, Residual, Slicing};
+pub use saltikov::{BinCountError, SphereKernel, condition_number, geometric_classes, profiles_per_area, scale};
 pub use section_law::SectionLaw;

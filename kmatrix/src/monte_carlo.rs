@@ -1,17 +1,18 @@
-//! The paper's way: random sections, one by one, by polygons (section 3.2). Slow, simple, and the judge of the exact sweep.
+//! The paper's way: random sections, one by one, by polygons or by pixels (section 3.2). Slow, simple, and the judge of the exact sweep.
 
 use crate::depth_measure::Moments;
 use crate::distribution::Table;
 use crate::exact::{Progress, Sample, SectionLawError};
+use crate::raster::StencilBuffer;
 use crate::section_law::{Calipers, DEFAULT_CELLS, SectionLaw, standard_error};
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use stereology_shape::{Body, BodyKind};
+use stereology_shape::{Body, BodyKind, TriangleMesh};
 
 /// Which area counts as the largest, A_max.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,6 +24,21 @@ pub enum LargestArea {
     Encountered,
 }
 
+/// How a random section is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Slicing {
+    /// Exact polygons.
+    #[default]
+    Polygons,
+    /// The paper's: the surface beyond the plane is drawn into a square picture that holds the whole body, pixels drawn an odd number of
+    /// times are inside, regions of pixels that touch by their sides are profiles. Small profiles are lost between pixels, near ones run
+    /// together.
+    Raster {
+        /// Pixels along a side of the picture, at least 8.
+        resolution: usize,
+    },
+}
+
 /// Options of [`SectionLaw::monte_carlo`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MonteCarloOptions {
@@ -32,6 +48,8 @@ pub struct MonteCarloOptions {
     pub seed: u64,
     /// What A_max is.
     pub largest: LargestArea,
+    /// How a section is measured.
+    pub slicing: Slicing,
 }
 
 impl Default for MonteCarloOptions {
@@ -41,6 +59,7 @@ impl Default for MonteCarloOptions {
             iterations: 100_000,
             seed: 0,
             largest: LargestArea::OfBody,
+            slicing: Slicing::Polygons,
         }
     }
 }
@@ -57,6 +76,13 @@ impl MonteCarloOptions {
     #[must_use]
     pub const fn with_seed(mut self, seed: u64) -> Self {
         self.seed = seed;
+        self
+    }
+
+    /// With sections measured in this way.
+    #[must_use]
+    pub const fn with_slicing(mut self, slicing: Slicing) -> Self {
+        self.slicing = slicing;
         self
     }
 
@@ -123,7 +149,9 @@ impl SectionLaw {
                 least: BATCHES,
             });
         }
+        check_slicing(options.slicing)?;
         let radius = bounding_radius(body);
+        let triangles = triangles(body, options.slicing);
         let wanted = options.iterations.div_ceil(BATCHES);
         let done = AtomicUsize::new(0);
         let batches: Vec<Batch> = (0..BATCHES)
@@ -131,7 +159,8 @@ impl SectionLaw {
             .map(|task| {
                 let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
                 rng.set_stream(task as u64);
-                let batch = throw_planes(body, radius, wanted, &mut rng)?;
+                let mut slicer = Slicer::new(body, &triangles, radius, options.slicing);
+                let batch = throw_planes(&mut slicer, radius, wanted, &mut rng)?;
                 let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / BATCHES as f64;
                 if progress(share).is_break() {
                     Err(SectionLawError::Cancelled)
@@ -185,8 +214,156 @@ fn bounding_radius(body: &Body) -> f64 {
     }
 }
 
-fn throw_planes(body: &Body, radius: f64, wanted: usize, rng: &mut ChaCha8Rng) -> Result<Batch, SectionLawError> {
-    let centre = body.centroid();
+fn check_slicing(slicing: Slicing) -> Result<(), SectionLawError> {
+    match slicing {
+        Slicing::Raster {
+            resolution: given @ ..8,
+        } => Err(SectionLawError::TooFew {
+            what: "pixels along a side",
+            given,
+            least: 8,
+        }),
+        Slicing::Raster {
+            resolution: given @ 16_385..,
+        } => Err(SectionLawError::TooMany {
+            what: "pixels along a side",
+            given,
+            most: 16_384,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// What is drawn; nothing where polygons are cut.
+fn triangles(body: &Body, slicing: Slicing) -> TriangleMesh {
+    match slicing {
+        Slicing::Polygons => TriangleMesh::default(),
+        Slicing::Raster { .. } => body.to_triangles(5),
+    }
+}
+
+/// Measures one section after another.
+enum Slicer<'a> {
+    Polygons(&'a Body),
+    Raster(Point3<f64>, StencilBuffer<'a>),
+}
+
+impl<'a> Slicer<'a> {
+    fn new(body: &'a Body, triangles: &'a TriangleMesh, radius: f64, slicing: Slicing) -> Self {
+        match slicing {
+            Slicing::Polygons => Self::Polygons(body),
+            Slicing::Raster { resolution } => {
+                let centre = body.centroid();
+                let buffer = StencilBuffer::new(&triangles.vertices, &triangles.triangles, centre, radius, resolution);
+                Self::Raster(centre, buffer)
+            }
+        }
+    }
+
+    fn centre(&self) -> Point3<f64> {
+        match self {
+            Self::Polygons(body) => body.centroid(),
+            Self::Raster(centre, _) => *centre,
+        }
+    }
+
+    fn profile_areas(&mut self, normal: &UnitVector3<f64>, offset: f64) -> Vec<f64> {
+        match self {
+            Self::Polygons(body) => body.profile_areas(normal, offset),
+            Self::Raster(_, buffer) => buffer.profile_areas(normal, offset),
+        }
+    }
+}
+
+/// The paper's histogram after so many random sections, against the law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residual {
+    /// Random sections that hit.
+    pub iterations: usize,
+    /// For each of the bins of √(A / A_max): the share of profiles counted in it less the law's. The paper found it below 0.005 for each
+    /// bin within 100,000 iterations.
+    pub per_bin: Vec<f64>,
+}
+
+/// Sections between two looks at the histogram.
+const BLOCK: usize = 500;
+
+impl SectionLaw {
+    /// How the paper's histogram of the largest particle's profiles (the last column of K) comes near this law while random sections of
+    /// `body` are counted: its residual after 500, 1000, ... sections.
+    ///
+    /// # Errors
+    ///
+    /// As [`monte_carlo`](Self::monte_carlo).
+    ///
+    /// ```
+    /// use stereology_kmatrix::{MonteCarloOptions, SectionLaw};
+    /// use stereology_shape::Body;
+    ///
+    /// let sphere = Body::sphere(1.0)?;
+    /// let options = MonteCarloOptions::default().with_iterations(10_000);
+    /// let residuals = SectionLaw::sphere(1.0)?.residuals(&sphere, 10, &options)?;
+    /// assert!(residuals[19].iterations == 10_000 && residuals[19].per_bin.iter().all(|r| r.abs() < 0.03));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn residuals(
+        &self,
+        body: &Body,
+        bins: usize,
+        options: &MonteCarloOptions,
+    ) -> Result<Vec<Residual>, SectionLawError> {
+        check_slicing(options.slicing)?;
+        let radius = bounding_radius(body);
+        let triangles = triangles(body, options.slicing);
+        let blocks = options.iterations.div_ceil(BLOCK);
+        let histograms: Vec<Vec<f64>> = (0..blocks)
+            .into_par_iter()
+            .map_init(
+                || Slicer::new(body, &triangles, radius, options.slicing),
+                |slicer, block| {
+                    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+                    rng.set_stream(block as u64);
+                    let batch = throw_planes(slicer, radius, BLOCK, &mut rng)?;
+                    let mut histogram = vec![0.0; bins];
+                    for area in batch.areas {
+                        let x = (area / self.max_area).sqrt();
+                        // Bins are (a, b].
+                        let bin = (0..bins)
+                            .find(|&i| x <= (i + 1) as f64 / bins as f64)
+                            .unwrap_or(bins - 1);
+                        histogram[bin] += 1.0;
+                    }
+                    Ok(histogram)
+                },
+            )
+            .collect::<Result<_, SectionLawError>>()?;
+        let exact: Vec<f64> = (0..bins)
+            .map(|i| self.cdf((i + 1) as f64 / bins as f64) - self.cdf(i as f64 / bins as f64))
+            .collect();
+        let mut sum = vec![0.0; bins];
+        let residuals = histograms.iter().enumerate().map(|(block, histogram)| {
+            sum.iter_mut().zip(histogram).for_each(|(sum, count)| *sum += count);
+            let whole: f64 = sum.iter().sum();
+            Residual {
+                iterations: (block + 1) * BLOCK,
+                per_bin: sum
+                    .iter()
+                    .zip(&exact)
+                    .map(|(count, exact)| count / whole - exact)
+                    .collect(),
+            }
+        });
+        Ok(residuals.collect())
+    }
+}
+
+fn throw_planes(
+    slicer: &mut Slicer<'_>,
+    radius: f64,
+    wanted: usize,
+    rng: &mut ChaCha8Rng,
+) -> Result<Batch, SectionLawError> {
+    let centre = slicer.centre();
     let mut batch = Batch {
         areas: Vec::with_capacity(wanted),
         hits: 0,
@@ -199,7 +376,7 @@ fn throw_planes(body: &Body, radius: f64, wanted: usize, rng: &mut ChaCha8Rng) -
         }
         let normal = UnitVector3::new_normalize(Vector3::from(UnitSphere.sample(rng)));
         let offset = centre.coords.dot(&normal) + radius * (2.0 * rng.random::<f64>() - 1.0);
-        let areas = body.profile_areas(&normal, offset);
+        let areas = slicer.profile_areas(&normal, offset);
         batch.planes += 1;
         batch.total_squared += areas.iter().sum::<f64>().powi(2);
         batch.hits += usize::from(!areas.is_empty());

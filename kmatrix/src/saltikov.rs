@@ -79,6 +79,40 @@ impl SphereKernel {
     }
 }
 
+/// Edges of Saltikov's geometric classes, for comparison: relative diameters 10^(−0.1 k), so that classes of A / A_max fall by a factor of
+/// 0.631; from 10^(−0.1 n) up to 1. He used 12.
+///
+/// Prior authors took these (paper, section 3.2); the paper's equal classes of √(A / A_max) spread profiles more evenly. Give them to
+/// [`SectionLaw::kernel`](crate::SectionLaw::kernel) as both edges, times the largest size.
+///
+/// ```
+/// use stereology_kmatrix::{SectionLaw, Sizes, condition_number, geometric_classes};
+///
+/// let sphere = SectionLaw::sphere(1.0)?;
+/// let edges = geometric_classes(10);
+/// let geometric = condition_number(&sphere.kernel(&edges, &edges, Sizes::UpperEdge)?);
+/// let equal = condition_number(&sphere.k_matrix(10));
+/// assert!(geometric < 12.0 && equal < 12.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[must_use]
+pub fn geometric_classes(classes: usize) -> Vec<f64> {
+    (0..=classes)
+        .map(|i| 10.0_f64.powf(-0.1 * (classes - i) as f64))
+        .collect()
+}
+
+/// Largest over smallest singular value of a kernel: how much unfolding may magnify relative errors of profile counts. Infinite if the
+/// kernel cannot be inverted; 1 without entries.
+#[must_use]
+pub fn condition_number(kernel: &DMatrix<f64>) -> f64 {
+    if kernel.is_empty() {
+        return 1.0;
+    }
+    let values = kernel.clone().singular_values();
+    values.max() / values.min()
+}
+
 /// Profiles per unit area of particles with a mean caliper: `N_A = H N_V`, eq. (1).
 ///
 /// `mean_caliper` is a length, `number_density` particles per unit volume. Eq. (1) holds for convex particles; for others take

@@ -126,7 +126,9 @@ impl SectionLaw {
         let width = body.mean_width();
         // ∫ A² dh = (16/15) w A₀² with A₀ = V / (4 w / 3): (3/5) V² ⟨1 / w⟩.
         let total = match body.kind() {
-            BodyKind::Ellipsoid { semi_axes } => 0.6 * body.volume().powi(2) * ellipsoid::mean_reciprocal_half_width(semi_axes),
+            BodyKind::Ellipsoid { semi_axes } => {
+                0.6 * body.volume().powi(2) * ellipsoid::mean_reciprocal_half_width(semi_axes)
+            }
             _ => 1.2 * body.volume().powi(2) / width,
         };
         Self {

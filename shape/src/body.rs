@@ -6,10 +6,14 @@ use std::sync::Arc;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::closed_mesh::{ClosedMesh, MeshError};
+#[cfg(feature = "io")]
+use crate::control_sphere::ControlSphere;
 use crate::elliptic::{self, carlson_rg};
+use crate::hull::convex_hull;
 use crate::largest_section::largest_section_area;
 use crate::rock;
 use crate::section::Slicer;
+use crate::superellipsoid::{EXPONENTS, superellipsoid};
 use crate::triangle_mesh::TriangleMesh;
 
 /// A solid body in its own unit of length and its own place, measured once.
@@ -80,12 +84,29 @@ pub enum BodyError {
     },
     /// Neither a shape nor a mesh file.
     #[error(
-        "{spec:?} is not a shape: write sphere, ellipsoid:A,B,C (semi-axes), box:A,B,C (edges), cylinder:D,L, rock:SEED, or the name of a \
-         mesh file (.obj, .stl, .ply)"
+        "{spec:?} is not a shape: write sphere, ellipsoid:A,B,C (semi-axes), box:A,B,C (edges), cylinder:D,L, rock:SEED[,ROUGHNESS], \
+         superellipsoid:A,B,C,E1,E2, hull:FILE, or the name of a mesh (.obj, .stl, .ply) or control-point file (.json)"
     )]
     UnknownShape {
         /// What was given.
         spec: String,
+    },
+    /// A roughness outside 0 to 1.
+    #[error("the roughness of a rock is a number from 0 to 1, not {0}")]
+    Roughness(f64),
+    /// An exponent of a superellipsoid outside 0.05 to 4.
+    #[error("the exponents of a superellipsoid are numbers from 0.05 (a box) over 1 (an ellipsoid) to 4, not {0}")]
+    Exponent(f64),
+    /// Points have no hull.
+    #[error(transparent)]
+    Hull(#[from] crate::hull::HullError),
+    /// The control points of a file make no surface.
+    #[error("{path}: {source}")]
+    ControlPoints {
+        /// The file.
+        path: String,
+        /// What is wrong with its control points.
+        source: crate::control_sphere::ControlSphereError,
     },
     /// The triangles enclose no solid.
     #[error(transparent)]
@@ -106,6 +127,9 @@ pub enum BodyError {
 
 /// Sides of the prism that stands for a cylinder.
 const CYLINDER_SIDES: u32 = 128;
+/// Steps of the surface of a control-point sphere for each of its arcs.
+#[cfg(feature = "io")]
+const CONTROL_STEPS: u32 = 16;
 
 impl Body {
     /// A sphere about the origin.
@@ -205,6 +229,59 @@ impl Body {
         Self::from_mesh(rock::rock(seed))
     }
 
+    /// The rock of the same seed with a rough surface, 5,120 triangles: radii times exp(`amplitude` g), where g is a random sum of
+    /// spherical harmonics of degrees 3 to 20, self-affine, of mean square 1. Amplitudes of 0.02 (worn) to 0.1 (jagged) look like stone.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError::Length`] unless the amplitude is from 0 to 1.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let rough = Body::rough_rock(5, 0.05)?;
+    /// assert!(!rough.is_convex() && (rough.volume() / Body::rock(5).volume() - 1.0).abs() < 0.2);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn rough_rock(seed: u64, amplitude: f64) -> Result<Self, BodyError> {
+        if !(0.0..=1.0).contains(&amplitude) {
+            return Err(BodyError::Roughness(amplitude));
+        }
+        Ok(Self::from_mesh(rock::rough_rock(seed, amplitude)?))
+    }
+
+    /// A superellipsoid about the origin with these **semi**-axes along x, y, z and exponents (north-south, east-west): near 0 a box, 1 an
+    /// ellipsoid, 2 an octahedron, beyond a star. A mesh of up to 5,120 triangles with its vertices on the surface.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError`] unless axes are lengths and exponents from 0.05 to 4.
+    ///
+    /// ```
+    /// # use stereology_shape::Body;
+    /// let pillow = Body::superellipsoid([1.0, 1.0, 0.5], [0.5, 0.5])?;
+    /// let (ball, brick) = (Body::ellipsoid([1.0, 1.0, 0.5])?.volume(), 4.0);
+    /// assert!(pillow.is_convex() && pillow.volume() > ball && pillow.volume() < brick);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    pub fn superellipsoid(semi_axes: [f64; 3], exponents: [f64; 2]) -> Result<Self, BodyError> {
+        for axis in semi_axes {
+            check_length("semi-axis", axis)?;
+        }
+        if let Some(&wrong) = exponents.iter().find(|e| !EXPONENTS.contains(e)) {
+            return Err(BodyError::Exponent(wrong));
+        }
+        Ok(Self::from_mesh(superellipsoid(semi_axes, exponents)?))
+    }
+
+    /// The convex hull of points.
+    ///
+    /// # Errors
+    ///
+    /// [`BodyError::Hull`] if they have none with a volume.
+    pub fn hull(points: &[Point3<f64>]) -> Result<Self, BodyError> {
+        Ok(Self::from_mesh(convex_hull(points)?))
+    }
+
     /// The solid inside a closed mesh.
     ///
     /// ```
@@ -223,7 +300,8 @@ impl Body {
     }
 
     /// Reads a body from its description: `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`,
-    /// `rock:SEED`, or the name of a mesh file (feature `io`).
+    /// `rock:SEED` or `rock:SEED,ROUGHNESS`, `superellipsoid:A,B,C,E1,E2` (semi-axes, exponents), and with feature `io` `hull:FILE` (of the
+    /// vertices of a mesh file) or the name of a mesh file or of a control-point sphere (.json).
     ///
     /// # Errors
     ///
@@ -236,6 +314,15 @@ impl Body {
     /// # Ok::<(), stereology_shape::BodyError>(())
     /// ```
     pub fn parse(spec: &str) -> Result<Self, BodyError> {
+        Self::parse_welding(spec, 0.0)
+    }
+
+    /// [`parse`](Self::parse), where vertices of a mesh file nearer than `weld` to each other are joined first.
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`](Self::parse).
+    pub fn parse_welding(spec: &str, weld: f64) -> Result<Self, BodyError> {
         let (name, rest) = spec.split_once(':').unwrap_or((spec, ""));
         match name {
             "sphere" if rest.is_empty() => Self::sphere(1.0),
@@ -250,25 +337,58 @@ impl Body {
                 Self::cylinder(diameter, length)
             }
             "rock" => {
-                let seed = rest.trim().parse();
-                let wrong = |_| BodyError::Numbers {
+                let wrong = || BodyError::Numbers {
                     spec: spec.to_owned(),
-                    expected: "rock:SEED, a whole number",
+                    expected: "rock:SEED or rock:SEED,ROUGHNESS, a whole number and a number from 0 to 1",
                 };
-                Ok(Self::rock(seed.map_err(wrong)?))
+                let (seed, roughness) = match rest.split_once(',') {
+                    Some((seed, roughness)) => (seed, Some(roughness.trim().parse().map_err(|_| wrong())?)),
+                    None => (rest, None),
+                };
+                let seed = seed.trim().parse().map_err(|_| wrong())?;
+                roughness.map_or_else(|| Ok(Self::rock(seed)), |roughness| Self::rough_rock(seed, roughness))
             }
-            _ => Self::from_file(spec),
+            "superellipsoid" => {
+                let [a, b, c, e1, e2] = numbers(spec, rest, "superellipsoid:A,B,C,E1,E2 (semi-axes, exponents)")?;
+                Self::superellipsoid([a, b, c], [e1, e2])
+            }
+            #[cfg(feature = "io")]
+            "hull" => Self::hull(&crate::mesh_file::read_mesh(rest)?.vertices),
+            _ => Self::from_file(spec, weld),
         }
     }
 
     #[cfg(feature = "io")]
-    fn from_file(spec: &str) -> Result<Self, BodyError> {
+    fn from_file(spec: &str, weld: f64) -> Result<Self, BodyError> {
         let path = std::path::Path::new(spec);
+        if path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
+        {
+            return Self::from_control_points(spec);
+        }
         if crate::mesh_file::MeshFormat::from_path(path).is_err() {
             return Err(BodyError::UnknownShape { spec: spec.to_owned() });
         }
         let mesh = crate::mesh_file::read_mesh(path)?;
-        let closed = ClosedMesh::try_from(mesh).map_err(|source| BodyError::MeshOf {
+        let closed = ClosedMesh::welded_within(mesh, weld).map_err(|source| BodyError::MeshOf {
+            path: spec.to_owned(),
+            source,
+        })?;
+        Ok(Self::from_mesh(closed))
+    }
+
+    #[cfg(feature = "io")]
+    fn from_control_points(spec: &str) -> Result<Self, BodyError> {
+        let text = std::fs::read_to_string(spec).map_err(|source| crate::mesh_file::MeshFileError::Read {
+            path: spec.into(),
+            source,
+        })?;
+        let sphere = ControlSphere::from_json(&text).map_err(|source| BodyError::ControlPoints {
+            path: spec.to_owned(),
+            source,
+        })?;
+        let closed = ClosedMesh::try_from(sphere.triangles(CONTROL_STEPS)).map_err(|source| BodyError::MeshOf {
             path: spec.to_owned(),
             source,
         })?;
@@ -276,7 +396,7 @@ impl Body {
     }
 
     #[cfg(not(feature = "io"))]
-    fn from_file(spec: &str) -> Result<Self, BodyError> {
+    fn from_file(spec: &str, _weld: f64) -> Result<Self, BodyError> {
         Err(BodyError::UnknownShape { spec: spec.to_owned() })
     }
 

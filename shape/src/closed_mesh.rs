@@ -54,6 +54,11 @@ pub enum Repair {
         /// How many.
         count: usize,
     },
+    /// Vertices within the tolerance asked for of another were joined with it.
+    WeldedWithinTolerance {
+        /// How many.
+        count: usize,
+    },
     /// Triangles that used one vertex twice were dropped.
     DroppedDegenerate {
         /// How many.
@@ -86,6 +91,9 @@ impl std::fmt::Display for Repair {
         match self {
             Self::WeldedVertices { count } => {
                 write!(f, "{count} vertices were joined with others at the same position")
+            }
+            Self::WeldedWithinTolerance { count } => {
+                write!(f, "{count} vertices were joined with others within the tolerance")
             }
             Self::DroppedDegenerate { count } => write!(f, "{count} triangles that used a vertex twice were dropped"),
             Self::DroppedDuplicates { count } => write!(f, "{count} duplicate triangles were dropped"),
@@ -198,7 +206,32 @@ impl TryFrom<TriangleMesh> for ClosedMesh {
     type Error = MeshError;
 
     /// Checks, repairs what is safe, and measures. Cost: T log T, and the pairs of triangles whose boxes overlap.
-    fn try_from(mut mesh: TriangleMesh) -> Result<Self, MeshError> {
+    fn try_from(mesh: TriangleMesh) -> Result<Self, MeshError> {
+        Self::welded_within(mesh, 0.0)
+    }
+}
+
+impl ClosedMesh {
+    /// The mesh with vertices nearer than `tolerance` to each other joined ([`TriangleMesh::weld_within`]), then checked as by `try_from`.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshError`] if the triangles enclose no solid.
+    ///
+    /// ```
+    /// use stereology_shape::{ClosedMesh, Repair, TriangleMesh};
+    ///
+    /// // A cube of two halves whose seams do not quite meet.
+    /// let cube = TriangleMesh::cuboid([1.0; 3]);
+    /// let (mut one, mut two) = (cube.clone(), cube.mapped(|p| p * (1.0 + 1e-9)));
+    /// two.triangles.drain(..6);
+    /// one.triangles.truncate(6);
+    /// let halves = one.with(&two);
+    /// assert!(ClosedMesh::try_from(halves.clone()).is_err());
+    /// assert_eq!(ClosedMesh::welded_within(halves, 1e-6)?.repairs()[0], Repair::WeldedWithinTolerance { count: 8 });
+    /// # Ok::<(), stereology_shape::MeshError>(())
+    /// ```
+    pub fn welded_within(mut mesh: TriangleMesh, tolerance: f64) -> Result<Self, MeshError> {
         let mut repairs = Vec::new();
         let mut note = |count: usize, repair: Repair| {
             if count > 0 {
@@ -208,6 +241,10 @@ impl TryFrom<TriangleMesh> for ClosedMesh {
         check_numbers(&mesh)?;
         let count = mesh.weld();
         note(count, Repair::WeldedVertices { count });
+        if tolerance > 0.0 {
+            let count = mesh.weld_within(tolerance);
+            note(count, Repair::WeldedWithinTolerance { count });
+        }
         let count = topology::drop_degenerate(&mut mesh);
         note(count, Repair::DroppedDegenerate { count });
         let count = topology::drop_duplicates(&mut mesh);

@@ -29,11 +29,17 @@ pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
     let top = Search::new(mesh, &budget).summit_from(*first, 0.0);
     let mut tops: Vec<Cut> = others
         .par_iter()
-        .map_init(|| Search::new(mesh, &budget), |search, start| search.summit_from(*start, top.area))
+        .map_init(
+            || Search::new(mesh, &budget),
+            |search, start| search.summit_from(*start, top.area),
+        )
         .collect();
     tops.push(top);
     tops.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let snapped = tops.iter().take(budget.snaps).filter(|cut| cut.area > 0.999 * tops[0].area);
+    let snapped = tops
+        .iter()
+        .take(budget.snaps)
+        .filter(|cut| cut.area > 0.999 * tops[0].area);
     snapped
         .map(|cut| Search::new(mesh, &budget).snapped_summit(*cut).area)
         .fold(tops[0].area, f64::max)
@@ -73,7 +79,14 @@ impl Budget {
             (201..=5000, false) => (400, 32, 10, 1, 0.08, 1e-6),
             _ => (200, 32, 6, 1, 0.1, 1e-5),
         };
-        Self { directions, depths, climbs, snaps, step, finest }
+        Self {
+            directions,
+            depths,
+            climbs,
+            snaps,
+            step,
+            finest,
+        }
     }
 }
 
@@ -218,7 +231,11 @@ impl<'a> Search<'a> {
             }
         });
         wanted.sort_by(f64::total_cmp);
-        let mut best = Cut { normal, offset: bound.offset, area: 0.0 };
+        let mut best = Cut {
+            normal,
+            offset: bound.offset,
+            area: 0.0,
+        };
         for (offset, area) in self.areas_at(&wanted) {
             if area > best.area {
                 best = Cut { normal, offset, area };
@@ -310,7 +327,12 @@ impl<'a> Search<'a> {
             a.min(b).min(c) <= margin && a.max(b).max(c) >= -margin
         };
         let triangles = self.mesh.triangles().iter().enumerate();
-        self.nearby = Some(triangles.filter(|(_, corners)| spans(corners)).map(|(t, _)| t).collect());
+        self.nearby = Some(
+            triangles
+                .filter(|(_, corners)| spans(corners))
+                .map(|(t, _)| t)
+                .collect(),
+        );
     }
 
     /// The cut of a plane near `from`: turned by x and y about two axes in it, which `turn` turns, and shifted by z times the reach.

@@ -40,6 +40,7 @@
 
 mod body;
 mod closed_mesh;
+mod control_sphere;
 mod convex;
 mod elliptic;
 mod hull;
@@ -62,8 +63,11 @@ mod rock;
 mod section;
 mod section_areas;
 mod self_intersection;
+mod spherical_harmonics;
 #[cfg(feature = "io")]
 mod stl;
+mod subdivision;
+mod superellipsoid;
 mod topology;
 mod triangle_mesh;
 mod unit_body;
@@ -71,6 +75,7 @@ mod winding;
 
 pub use body::{Body, BodyError, BodyKind};
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};
+pub use control_sphere::{ControlSphere, ControlSphereError};
 pub use hull::{HullError, convex_hull};
 #[cfg(feature = "io")]
 pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};
@@ -78,5 +83,6 @@ pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
 pub use section::{SectionPolygon, section_polygons};
 pub use section_areas::SectionAreas;
+pub use subdivision::Subdivision;
 pub use triangle_mesh::TriangleMesh;
 pub use unit_body::UnitBody;

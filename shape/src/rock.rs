@@ -5,8 +5,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
-use crate::closed_mesh::ClosedMesh;
+use crate::closed_mesh::{ClosedMesh, MeshError};
 use crate::hull::convex_hull;
+use crate::measures::double_area;
+use crate::spherical_harmonics::Roughness;
+use crate::superellipsoid::star;
 
 /// A convex rock of 16 to 38 triangular faces, about one unit across; the same mesh for the same seed.
 ///
@@ -21,6 +24,34 @@ pub(crate) fn rock(seed: u64) -> ClosedMesh {
             _ => {}
         }
     }
+}
+
+/// The rock of a seed with a rough surface: its radius in every direction times exp(amplitude × g), g a random function of mean square 1.
+///
+/// 5,120 triangles; star-shaped, so it cannot cut through itself. Not convex as a rule.
+pub(crate) fn rough_rock(seed: u64, amplitude: f64) -> Result<ClosedMesh, MeshError> {
+    let smooth = rock(seed);
+    let centre = smooth.centroid().coords;
+    let faces: Vec<(Vector3<f64>, f64)> = (0..smooth.triangles().len())
+        .map(|t| {
+            let corners = smooth.as_triangle_mesh().corners(t);
+            let normal = double_area(&corners);
+            (normal, normal.dot(&(corners[0].coords - centre)))
+        })
+        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(1);
+    let rough = Roughness::random(&mut rng);
+    ClosedMesh::try_from(star(4, |u| {
+        // The first face that a ray from the centre meets.
+        let reach = faces
+            .iter()
+            .map(|(normal, height)| (normal.dot(u), height))
+            .filter(|(slope, _)| *slope > 0.0)
+            .map(|(slope, height)| height / slope)
+            .fold(f64::INFINITY, f64::min);
+        reach * (amplitude * rough.at(u)).exp()
+    }))
 }
 
 /// Points on an ellipsoid, each pulled in by up to 0.22 of its distance.

@@ -2,12 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use stereology::kmatrix::{MonteCarloOptions, SectionLaw, SectionOptions};
+use stereology::kmatrix::{
+    LargestArea, MonteCarloOptions, SectionLaw, SectionOptions, Sizes, Slicing, condition_number, geometric_classes,
+};
 use stereology::shape::Body;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
-use crate::failure::{Explain, Failure, body};
+use crate::failure::{Explain, Failure, body_welding};
 use crate::numbers::significant;
 use crate::progress::Step;
 use crate::values::{bins, count, positive};
@@ -21,7 +23,7 @@ const MOST_SECTIONS: f64 = 2e7;
 /// Cuts SHAPE by isotropic uniform random planes and tells the law of the profile sizes: the K matrix of the paper (eq. 5), the mean caliper and the
 /// largest section. Spheres and ellipsoids have closed forms; for meshes the areas are exact in depth for each direction, and an error bar tells what the
 /// finite number of directions leaves open. SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED` or a closed mesh (.obj, .stl,
-/// .ply); an open mesh is refused.
+/// .ply); what `stereology shape` takes as SPEC is one too. An open mesh, or one that cuts through itself, is refused.
 ///
 /// Row i, column j of `matrix`: relative to one plane hit by a particle of the largest size, how many profiles of bin i a particle at the upper edge of
 /// bin j shows. Column j sums to j/N.
@@ -42,9 +44,15 @@ pub struct Kmatrix {
     /// Exact in depth for each direction, or the paper's random sections
     #[arg(long, value_enum, default_value_t = Method::Exact)]
     pub method: Method,
-    /// The paper's normalisation, `caliper` = mean caliper of the hull: counts one profile a hit (the same for convex bodies)
+    /// The paper's normalisation, `caliper` = mean caliper of the hull: counts one profile a hit (the same for convex bodies). `paper` compares both
     #[arg(long)]
     pub paper: bool,
+    /// Pixels along a side of the picture of --method raster
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(8..=4096))]
+    pub resolution: u16,
+    /// Join vertices of a mesh file that are nearer than this to each other, in its units
+    #[arg(long, value_name = "DISTANCE", value_parser = positive)]
+    pub weld: Option<f64>,
 }
 
 /// How the section law is found.
@@ -52,13 +60,15 @@ pub struct Kmatrix {
 pub enum Method {
     /// Exact in depth for each of many directions
     Exact,
-    /// 100,000 random sections, as in the paper
+    /// 100,000 random sections, as in the paper, cut as polygons
     MonteCarlo,
+    /// 100,000 random sections as the paper cut them: drawn, pixels covered an odd number of times inside, the largest area met for A_max
+    Raster,
 }
 
 impl Kmatrix {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let body = body(&self.shape)?;
+        let body = body_welding(&self.shape, self.weld)?;
         let law = self.law(&body, everywhere)?;
         let matrix = law.k_matrix(self.bins);
         let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
@@ -80,10 +90,38 @@ impl Kmatrix {
             .field("surface_area", law.surface_area())
             .field("caliper_hull", law.caliper_hull())
             .field("caliper_effective", law.caliper_effective())
+            .field("caliper_chi", law.caliper_chi())
+            .field("caliper_holes", law.caliper_holes())
+            .field(
+                "caliper_effective_standard_error",
+                law.caliper_effective_standard_error(),
+            )
             .field("profiles_per_hit", law.profiles_per_hit())
             .field("max_area", law.max_area())
+            .field("mean_area", law.mean_profile_area())
+            .field("mean_square_area", law.mean_square_profile_area())
+            .field("mean_section_area", law.mean_section_area())
+            .field("mean_square_section_area", law.mean_square_section_area())
+            .field("self_energy", law.self_energy())
             .field("normalisation", if self.paper { "paper" } else { "profiles" })
             .field("caliper", caliper)
+            .field(
+                "paper",
+                self.paper.then(|| {
+                    json!({
+                        "caliper": law.caliper_hull(),
+                        "caliper_of_profiles": law.caliper_effective(),
+                        "densities_too_large_by": law.profiles_per_hit(),
+                    })
+                }),
+            )
+            .field(
+                "condition_numbers",
+                json!({
+                    "equal_diameters": condition_number(&matrix),
+                    "saltikov_areas": saltikov_condition(&law, self.bins),
+                }),
+            )
             .field("bins", self.bins)
             .field("matrix", rows.clone())
             .field("standard_error", standard_error)
@@ -121,8 +159,14 @@ impl Kmatrix {
                 };
                 SectionLaw::of_body_with_progress(body, &options, &progress).or_fail()
             }
-            Method::MonteCarlo => {
+            Method::MonteCarlo | Method::Raster => {
                 let mut options = MonteCarloOptions::default().with_seed(everywhere.seed);
+                if self.method == Method::Raster {
+                    let resolution = usize::from(self.resolution);
+                    options = options
+                        .with_slicing(Slicing::Raster { resolution })
+                        .with_largest(LargestArea::Encountered);
+                }
                 if let Some(sections) = self.directions {
                     options = options.with_iterations(sections);
                 }
@@ -196,4 +240,11 @@ impl Kmatrix {
             answer.line(cells.join(" "));
         }
     }
+}
+
+/// Condition number of the kernel of Saltikov's geometric classes; none if it cannot be inverted.
+fn saltikov_condition(law: &SectionLaw, classes: usize) -> Option<f64> {
+    let edges: Vec<f64> = geometric_classes(classes);
+    let kernel = law.kernel(&edges, &edges, Sizes::UpperEdge).ok()?;
+    Some(condition_number(&kernel)).filter(|number| number.is_finite())
 }

@@ -6,6 +6,7 @@ pub mod pack;
 pub mod pyramid;
 pub mod render;
 pub mod segment;
+pub mod shape;
 pub mod slice;
 pub mod synthesize;
 pub mod texture;
@@ -43,13 +44,12 @@ pub enum Command {
     Pack(pack::Pack),
     Texture(texture::Texture),
     Pyramid(pyramid::Pyramid),
+    Shape(shape::Shape),
     Slice(slice::Slice),
     Render(render::Render),
     Export(export::Export),
     /// Not available yet: a mesh with the solid's texture as vertex colours
     Carve(Later),
-    /// Not available yet: a shape as a mesh file
-    Shape(Later),
     /// Not available yet: measures of a finished solid
     Measure(Later),
     /// Not available yet: a solid from one picture without particles
@@ -89,11 +89,11 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Pack(options) => options.run(everywhere).map(Some),
         Command::Texture(options) => options.run(everywhere).map(Some),
         Command::Pyramid(options) => options.run(everywhere).map(Some),
+        Command::Shape(options) => options.run(everywhere).map(Some),
         Command::Slice(options) => options.run(everywhere).map(Some),
         Command::Render(options) => options.run(everywhere).map(Some),
         Command::Export(options) => options.run(everywhere).map(Some),
         Command::Carve(rest) => later("carve", rest),
-        Command::Shape(rest) => later("shape", rest),
         Command::Measure(rest) => later("measure", rest),
         Command::Exemplar(rest) => later("exemplar", rest),
         Command::Grow(rest) => later("grow", rest),

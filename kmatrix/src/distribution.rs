@@ -131,18 +131,6 @@ impl Table {
         Self { angles, values, slopes }
     }
 
-    /// The mean of several tables over the same angles.
-    pub(crate) fn mean(tables: &[Self]) -> Self {
-        let count = tables.len() as f64;
-        let angles = tables
-            .first()
-            .map_or_else(|| vec![0.0, FRAC_PI_2], |table| table.angles.clone());
-        let values = (0..angles.len())
-            .map(|k| tables.iter().map(|table| table.values[k]).sum::<f64>() / count)
-            .collect();
-        Self::new(angles, values)
-    }
-
     pub(crate) fn at(&self, theta: f64) -> f64 {
         let cell = self
             .angles
@@ -159,7 +147,7 @@ impl Table {
 
 /// One-sided parabolic slope at an end, limited so that the curve stays monotone.
 fn end_slope(near: f64, near_step: f64, next: f64, next_step: f64) -> f64 {
-    (near + (near - next) * near_step / (near_step + next_step)).clamp(0.0, 2.0 * near)
+    (near + (near - next) * near_step / (near_step + next_step)).clamp(0.0, 2.0 * near.max(0.0))
 }
 
 #[cfg(test)]

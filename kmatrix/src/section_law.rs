@@ -181,6 +181,9 @@ impl SectionLaw {
     }
 
     /// Standard error of every entry of [`k_matrix`](Self::k_matrix), from the spread between random rotations; zero for closed forms.
+    ///
+    /// An entry that only few directions feed (sections just above the area of a face) has a skewed error that a spread cannot tell: judge
+    /// all by the [largest](Self::standard_error).
     #[must_use]
     pub fn k_standard_errors(&self, bins: usize) -> DMatrix<f64> {
         let samples: Vec<_> = self

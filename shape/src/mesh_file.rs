@@ -42,6 +42,31 @@ impl MeshFormat {
             _ => Err(MeshFileError::Format { path: path.to_owned() }),
         }
     }
+
+    /// The triangles in the bytes of a file of this format; `name` is what errors call it.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshFileError::Content`]: the place and the fault.
+    ///
+    /// ```
+    /// # use stereology_shape::MeshFormat;
+    /// let mesh = MeshFormat::Obj.parse(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "drop.obj".as_ref())?;
+    /// assert_eq!(mesh.triangles, [[0, 1, 2]]);
+    /// # Ok::<(), stereology_shape::MeshFileError>(())
+    /// ```
+    pub fn parse(self, bytes: &[u8], name: &Path) -> Result<TriangleMesh, MeshFileError> {
+        let mesh = match self {
+            Self::Obj => obj::parse(bytes),
+            Self::Stl => stl::parse(bytes),
+            Self::Ply => ply::parse(bytes),
+        };
+        mesh.map_err(|(place, fault)| MeshFileError::Content {
+            path: name.to_owned(),
+            place,
+            fault,
+        })
+    }
 }
 
 /// Why a mesh file could not be read or written.
@@ -193,16 +218,7 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> 
         path: path.to_owned(),
         source,
     })?;
-    let mesh = match format {
-        MeshFormat::Obj => obj::parse(&bytes),
-        MeshFormat::Stl => stl::parse(&bytes),
-        MeshFormat::Ply => ply::parse(&bytes),
-    };
-    mesh.map_err(|(place, fault)| MeshFileError::Content {
-        path: path.to_owned(),
-        place,
-        fault,
-    })
+    format.parse(&bytes, path)
 }
 
 /// Writes triangles as a mesh file; the ending of its name tells the format. An existing file is replaced, and only by a whole one: the

@@ -2,5 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests stop at the first surprise")]
 
 mod brute_force;
+mod energies;
 mod identities;
 mod meshes;
+mod paper;

@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use nalgebra::{UnitVector3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_4;
-use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody, section_polygons};
+use stereology_shape::{Body, ClosedMesh, SectionAreas, TriangleMesh, UnitBody, section_polygons};
 
 use crate::random_shapes::{directions, fat_l, hollow_cube, polytopes, torus};
 
@@ -100,4 +100,64 @@ fn planes_through_vertices_edges_and_faces_cut_whole_profiles() {
         area([1.0, 1.0, 1.0], 3.0_f64.sqrt()).iter().sum::<f64>() < 1e-12,
         "a corner only"
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// ∫ A dh = V for every direction, whatever the body.
+    #[test]
+    fn areas_add_up_to_the_volume(mesh in polytopes(), normal in directions(), seed in 0_u64..50) {
+        let rough = Body::rough_rock(seed, 0.08).unwrap();
+        for mesh in [&mesh, rough.mesh().unwrap()] {
+            let mut areas = SectionAreas::new(mesh);
+            let mut volume = 0.0;
+            let defect = areas.sweep(&normal, |low, high, [a, b, c]| {
+                let t = high - low;
+                volume += t * (a + t * (b / 2.0 + t * c / 3.0));
+            });
+            prop_assert!(defect < 1e-7);
+            prop_assert!((volume * areas.reach().powi(3) / mesh.volume() - 1.0).abs() < 1e-7);
+        }
+    }
+
+    /// The largest section of a box goes through two opposite longest edges.
+    #[test]
+    fn largest_sections_of_boxes(mut edges in prop::array::uniform3(0.05..1.0_f64)) {
+        let found = Body::cuboid(edges).unwrap().largest_section_area();
+        edges.sort_by(f64::total_cmp);
+        let exact = edges[2] * edges[0].hypot(edges[1]);
+        prop_assert!((found / exact - 1.0).abs() < 1e-9, "{found} {exact}");
+    }
+}
+
+/// A cylinder's largest section is the larger of its base, the rectangle through its axis, and what lies between.
+#[test]
+fn a_cylinder_has_its_mean_width_and_largest_section() {
+    let (d, l) = (1.0, 4.0);
+    let can = Body::cylinder(d, l).unwrap();
+    assert!((can.mean_width() - 0.5 * (l + std::f64::consts::FRAC_PI_2 * d)).abs() < 1e-3);
+    assert!(can.largest_section_area() > d * l * (1.0 - 1e-3));
+}
+
+/// V = 2 a b c e₁ e₂ B(e₁/2 + 1, e₁) B(e₂/2, e₂/2); at e = 2 an octahedron, 4 a b c / 3.
+#[test]
+fn superellipsoids_have_their_volume() {
+    let octahedron = Body::superellipsoid([1.0, 2.0, 3.0], [2.0, 2.0]).unwrap();
+    assert!(
+        (octahedron.volume() / 8.0 - 1.0).abs() < 0.01,
+        "{}",
+        octahedron.volume()
+    );
+    let ellipsoid = Body::superellipsoid([1.0, 2.0, 3.0], [1.0, 1.0]).unwrap();
+    assert!((ellipsoid.volume() / Body::ellipsoid([1.0, 2.0, 3.0]).unwrap().volume() - 1.0).abs() < 0.01);
+    // e₁ = e₂ = 2/3: |x|³ + |y|³ + |z|³ ≤ 1, volume 8 Γ(4/3)³ / Γ(2).
+    let cubic = Body::superellipsoid([1.0; 3], [2.0 / 3.0; 2]).unwrap();
+    assert!(
+        (cubic.volume() / (8.0 * 0.892_979_5_f64.powi(3)) - 1.0).abs() < 0.01,
+        "{}",
+        cubic.volume()
+    );
+    assert!(Body::superellipsoid([1.0; 3], [3.0, 3.0]).unwrap().volume() < 4.0 / 3.0);
+    assert!(Body::superellipsoid([1.0; 3], [0.0, 1.0]).is_err() && Body::rough_rock(1, f64::NAN).is_err());
 }

@@ -1,0 +1,77 @@
+//! What may be asked of any bytes: an error or a result, never a panic, a hang or a number that is none.
+//!
+//! `cargo fuzz run mesh_file` (nightly, cargo-fuzz) drives these functions with coverage; `cargo run --release --bin mutate -- SECONDS` drives them
+//! with random changes of small meshes, and needs neither.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+use stereology_kmatrix::{SectionLaw, SectionOptions};
+use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TriangleMesh};
+
+/// Meshes beyond this are read and checked, but not swept: time goes to small ones.
+const MOST_SWEPT: usize = 400;
+
+/// Reads the bytes as every format of mesh file, and sweeps what encloses a solid.
+pub fn mesh_file(bytes: &[u8]) {
+    for format in [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply] {
+        if let Ok(mesh) = format.parse(bytes, Path::new("bytes")) {
+            solid(mesh);
+        }
+    }
+    if let Ok(text) = std::str::from_utf8(bytes)
+        && let Ok(sphere) = ControlSphere::from_json(text)
+    {
+        solid(sphere.triangles(3));
+    }
+}
+
+/// Takes the bytes for a mesh: how many vertices, coordinates of a byte each (so that many lie in common planes, on common lines and at
+/// common places) or of eight, and triangles of three bytes.
+pub fn sweep(bytes: &[u8]) {
+    let [count, kind, rest @ ..] = bytes else { return };
+    let wide = kind % 4 == 0;
+    let width = if wide { 24 } else { 3 };
+    let vertices = usize::from(*count);
+    let Some((positions, corners)) = rest.split_at_checked(vertices * width) else { return };
+    let coordinate = |bytes: &[u8]| match bytes {
+        [x] => f64::from(*x % (2 + kind)),
+        _ => f64::from_le_bytes(bytes.try_into().unwrap_or_default()),
+    };
+    let vertices = positions
+        .chunks_exact(width)
+        .map(|p| {
+            let mut at = p.chunks_exact(width / 3).map(coordinate);
+            let mut next = || at.next().unwrap_or_default();
+            Point3::new(next(), next(), next())
+        })
+        .collect();
+    let triangles = corners
+        .chunks_exact(3)
+        .map(|t| [t[0], t[1], t[2]].map(|v| u32::from(v) % (u32::from(*count) + u32::from(kind % 7 == 0)).max(1)))
+        .collect();
+    solid(TriangleMesh { vertices, triangles });
+}
+
+fn solid(mesh: TriangleMesh) {
+    let Ok(closed) = ClosedMesh::try_from(mesh) else { return };
+    assert!(closed.volume() > 0.0 && closed.volume().is_finite());
+    assert!(closed.mean_width() > 0.0 && closed.signed_mean_width().is_finite());
+    if closed.triangles().len() > MOST_SWEPT {
+        return;
+    }
+    let body = Body::from_mesh(closed);
+    assert!(body.largest_section_area() > 0.0 && body.size().is_finite());
+    for normal in [Vector3::x_axis(), Vector3::z_axis()] {
+        let areas = body.profile_areas(&normal, body.centroid().coords.dot(&normal));
+        assert!(areas.iter().all(|area| area.is_finite() && *area >= 0.0));
+    }
+    if let Ok(law) = SectionLaw::of_body(&body, &SectionOptions::default().with_directions(64)) {
+        let matrix = law.k_matrix(5);
+        for (j, column) in matrix.column_iter().enumerate() {
+            assert!((column.sum() - (j + 1) as f64 / 5.0).abs() < 1e-9, "{matrix}");
+            assert!(column.iter().all(|k| *k >= -1e-12));
+        }
+        assert!(law.caliper_effective().is_finite() && law.mean_square_profile_area().is_finite());
+    }
+}

@@ -250,7 +250,8 @@ impl Body {
     }
 
     /// A superellipsoid about the origin with these **semi**-axes along x, y, z and exponents (north-south, east-west): near 0 a box, 1 an
-    /// ellipsoid, 2 an octahedron, beyond a star. A mesh of up to 5,120 triangles with its vertices on the surface.
+    /// ellipsoid, 2 an octahedron, beyond a star. A mesh of up to 5,120 (stars: 8,192) triangles with its vertices on the
+    /// surface.
     ///
     /// # Errors
     ///

@@ -90,6 +90,9 @@ impl Budget {
     }
 }
 
+/// Rounds of a climb: most take some 30; along a ridge that bends the gains may grow small and never end.
+const MOST_ROUNDS: usize = 250;
+
 /// Where a climb looks, in steps: what second differences need.
 const POLLS: [[f64; 3]; 9] = [
     [1.0, 0.0, 0.0],
@@ -279,7 +282,9 @@ impl<'a> Search<'a> {
         let mut step = step;
         let mut turn = 0.0_f64;
         let mut failures = 0;
-        while step > self.budget.finest && !(step < 2e-3 && best.area < 0.99 * to_beat) {
+        let mut rounds = 0;
+        while step > self.budget.finest && rounds < MOST_ROUNDS && !(step < 2e-3 && best.area < 0.99 * to_beat) {
+            rounds += 1;
             let centre = best;
             self.look_about(&centre, step);
             // Fresh axes each round: on the ridges of polyhedra fixed ones get stuck.
@@ -295,7 +300,7 @@ impl<'a> Search<'a> {
                 let shorten = 4.0_f64.min(place.norm()) / place.norm().max(f64::MIN_POSITIVE) * step;
                 best = best.larger(&self.near(&centre, turn, (place * shorten).into()));
             }
-            if best.area > centre.area {
+            if best.area > centre.area * (1.0 + 1e-13) {
                 failures = 0;
                 continue;
             }

@@ -47,6 +47,34 @@ impl TriangleMesh {
         Self { vertices, triangles }
     }
 
+    /// The unit sphere: an octahedron with its corners on the axes, whose triangles are split in four `subdivisions` times.
+    pub(crate) fn octasphere(subdivisions: u32) -> Self {
+        let mut directions = vec![
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            Vector3::z(),
+            -Vector3::z(),
+        ];
+        let mut triangles = Vec::new();
+        for octant in 0..8_u32 {
+            let corner = |axis: u32| 2 * axis + (octant >> axis & 1);
+            let [x, y, z] = [0, 1, 2].map(corner);
+            // An odd number of mirrored axes turns the triangle over.
+            triangles.push(if octant.count_ones() % 2 == 0 {
+                [x, y, z]
+            } else {
+                [x, z, y]
+            });
+        }
+        for _ in 0..subdivisions {
+            triangles = split_in_four(&mut directions, &triangles);
+        }
+        let vertices = directions.into_iter().map(Point3::from).collect();
+        Self { vertices, triangles }
+    }
+
     /// Box with edges `[a, b, c]` along x, y, z: 12 triangles.
     ///
     /// ```

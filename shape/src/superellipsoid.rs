@@ -6,7 +6,7 @@ use crate::closed_mesh::{ClosedMesh, MeshError};
 use crate::hull::convex_hull;
 use crate::triangle_mesh::TriangleMesh;
 
-/// Times the icosphere behind a superellipsoid is split: 5,120 triangles.
+/// Times the icosphere behind a superellipsoid is split: 5,120 triangles; the octahedron behind a star once more: 8,192.
 const SUBDIVISIONS: u32 = 4;
 
 /// Exponents between which surfaces can be told from their limits in double precision.
@@ -32,11 +32,14 @@ pub(crate) fn superellipsoid(semi_axes: [f64; 3], exponents: [f64; 2]) -> Result
         let log_radius = -0.5 * e1 * log_of_sum(log_of_sum(x, y) * (e2 / e1), z);
         log_radius.exp()
     };
-    let mesh = star(SUBDIVISIONS, radius);
     if e1 <= 2.0 && e2 <= 2.0 {
+        let mesh = star(SUBDIVISIONS, radius);
         convex_hull(&mesh.vertices).map_err(|_| MeshError::ZeroVolume)
     } else {
-        ClosedMesh::try_from(mesh)
+        // The ridges of a star lie in the planes of the axes, and so do edges of a split octahedron.
+        ClosedMesh::try_from(
+            TriangleMesh::octasphere(SUBDIVISIONS + 1).mapped(|p| Point3::from(p.coords * radius(&p.coords))),
+        )
     }
 }
 

@@ -4,6 +4,7 @@ mod bars;
 mod density_recovery;
 mod estimators;
 mod grain_size_tools;
+mod particles;
 mod section_likelihood;
 mod solids;
 mod sphere_samples;
@@ -16,7 +17,10 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 8] = [
+    let figures: [(&str, Figure); 12] = [
+        ("figure-02-sphere-matrix", particles::draw_matrix),
+        ("figure-03-slices", particles::draw_slices),
+        ("figure-03-residual", particles::draw_residuals),
         ("figure-04-section-likelihood", section_likelihood::draw),
         ("figure-05-10-solid", solids::draw_blocks),
         ("figure-06-residual", solids::draw_residual),
@@ -24,6 +28,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("figure-08-recovered-volume", density_recovery::draw_volumes),
         ("estimators", estimators::draw_errors),
         ("coverage", estimators::draw_coverage),
+        ("figure-09-particles", particles::draw_shapes),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

@@ -4,11 +4,17 @@ use std::path::Path;
 
 use anyhow::Result;
 use stereology::kmatrix::{SectionLaw, SectionOptions};
-use stereology::shape::Body;
+use stereology::shape::{Body, ClosedMesh, TriangleMesh};
 
 use super::bars::{BLUE, Panel, Series, draw as draw_bars, table};
 
 const BINS: usize = 20;
+
+fn torus() -> Result<Body> {
+    Ok(Body::from_mesh(ClosedMesh::try_from(TriangleMesh::torus(
+        2.0, 0.5, 64, 32,
+    ))?))
+}
 
 pub fn draw(folder: &Path) -> Result<()> {
     let bodies = [
@@ -17,8 +23,12 @@ pub fn draw(folder: &Path) -> Result<()> {
         ("box 1 x 2 x 3", Body::cuboid([1.0, 2.0, 3.0])?),
         ("ellipsoid 1 : 2 : 3", Body::ellipsoid([1.0, 2.0, 3.0])?),
         ("cylinder, length 2 diameters", Body::cylinder(1.0, 2.0)?),
+        ("rough rock", Body::rough_rock(1, 0.05)?),
+        ("torus, tube a quarter of the ring", torus()?),
+        ("six-armed star", Body::superellipsoid([1.0; 3], [2.6, 2.6])?),
+        ("flat octahedron", Body::superellipsoid([1.0, 1.0, 0.5], [2.0, 2.0])?),
     ];
-    let options = SectionOptions::default().with_tolerance(1e-3);
+    let options = SectionOptions::default().with_bins(BINS).with_tolerance(1e-3);
     let mut figures = Vec::new();
     for (name, body) in &bodies {
         let law = SectionLaw::of_body(body, &options)?;

@@ -1,0 +1,11 @@
+//! Runs the targets on files: `replay FILE...`
+
+fn main() {
+    for name in std::env::args().skip(1) {
+        let bytes = std::fs::read(&name).expect("the file can be read");
+        let start = std::time::Instant::now();
+        stereology_fuzz::mesh_file(&bytes);
+        stereology_fuzz::sweep(&bytes);
+        println!("{name}: {:?}", start.elapsed());
+    }
+}

@@ -39,10 +39,10 @@
 //!
 //! # Why not Monte Carlo
 //!
-//! The paper takes 100,000 random sections for 0.5 %. It is here as [`SectionLaw::monte_carlo`], and judges the sweep in the tests; the sweep
-//! reaches 0.1 % with about 3,000 directions of a cube, in some 20 ms. The paper also loses the number of profiles per hit of bodies that are not
-//! convex ([`Counting::Paper`]): 1.4 to 1.6 for a
-//! torus, and number densities come out as many times too large.
+//! The paper takes 100,000 random sections for 0.5 %. It is here as [`SectionLaw::monte_carlo`], by polygons or by the paper's own stencil
+//! buffer, and judges the sweep in the tests; the sweep reaches 0.01 % of 758 triangles in 0.6 s on one core. The paper also loses the number
+//! of profiles per hit of bodies that are not convex ([`Counting::Paper`]): 1.4 to 1.6 for a torus, and number densities come out as many
+//! times too large.
 
 mod contours;
 mod depth_measure;

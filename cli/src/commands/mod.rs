@@ -28,7 +28,7 @@ pub const CONVENTIONS: &str = "\
 section, so a sphere's size is its diameter.
 - Size bins are (a, b]: N equal bins of (0, max-size] by `--bins N`, or `--edges a,b,...`, or `--spacing geometric`.
 - SHAPE is `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`, `rock:SEED`, or a mesh file (`.obj`, `.stl`, \
-`.ply`). `SHAPE=FRACTION` gives the share of the particles of that shape. Only proportions matter to unfolding and packing.
+`.ply`); or anything else that `stereology shape` takes as SPEC. `SHAPE=FRACTION` gives the share of the particles of that shape. Only proportions matter to unfolding and packing.
 - Arrays are u8 with axes (z, y, x, channel) in C order: `.npy` as is; `.nrrd` with sizes `3 nx ny nz`; `.vti` with one array `rgb` of three components, x \
 fastest; `.tif` with one RGB page a z.
 - `--json` prints one object whose first key is `schema`, `stereology.<command>/1`, and which has `warnings`, a list of `{code, message}` (codes below).

@@ -92,8 +92,51 @@ fn meshes_that_enclose_nothing() {
         fs::write(&mesh, text).unwrap();
         refused(1, &["kmatrix", &mesh]);
     }
+    // Two boxes that overlap: closed and manifold by their edges.
+    let boxes = [0.0, 0.4].map(|shift| {
+        (0..8)
+            .map(move |i| {
+                format!(
+                    "v {} {} {}\n",
+                    f64::from(i & 1) + shift,
+                    f64::from(i >> 1 & 1) + shift,
+                    f64::from(i >> 2)
+                )
+            })
+            .collect::<String>()
+    });
+    let faces = |first: usize| {
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        quads
+            .map(|q| {
+                format!(
+                    "f {} {} {} {}\n",
+                    q[0] + first,
+                    q[1] + first,
+                    q[2] + first,
+                    q[3] + first
+                )
+            })
+            .concat()
+    };
+    fs::write(&mesh, format!("{}{}{}{}", boxes[0], boxes[1], faces(1), faces(9))).unwrap();
+    assert!(refused(1, &["kmatrix", &mesh]).contains("cuts through itself"));
     refused(1, &["kmatrix", &path(&folder, "missing.stl")]);
     refused(2, &["kmatrix", "donut"]);
+    let out = path(&folder, "out.obj");
+    refused(2, &["shape", "donut", "-o", &out]);
+    refused(2, &["shape", "rock:1,7", "-o", &out]);
+    refused(2, &["shape", "box:1,1,1", "-o", &path(&folder, "out.json")]);
+    refused(2, &["shape", "sphere", "-o", &path(&folder, "out.xyz")]);
+    refused(1, &["shape", &mesh, "-o", &out]);
+    assert!(!std::path::Path::new(&out).exists());
     refused(2, &["kmatrix", "sphere", "--tolerance", "0"]);
 }
 

@@ -353,3 +353,39 @@ fn textures_and_their_bands() {
     ]);
     assert_eq!(image::open(&picture).unwrap().into_rgb8().dimensions(), (24, 40));
 }
+
+/// What `shape` writes is a SHAPE of the same measures.
+#[test]
+fn shapes_are_written_and_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let control = path(&folder, "pebble.json");
+    answer(&["shape", "sphere", "-o", &control]);
+    for (spec, name) in [
+        ("rock:3", "a.obj"),
+        ("rock:3,0.05", "b.ply"),
+        ("superellipsoid:1,1,1,0.5,0.5", "c.stl"),
+        (&control, "d.obj"),
+    ] {
+        let file = path(&folder, name);
+        let written = answer(&["shape", spec, "-o", &file]);
+        let read = answer(&["kmatrix", &file, "--directions", "64", "--paper"]);
+        for key in ["volume", "surface_area", "caliper_hull", "max_area"] {
+            let (a, b) = (written[key].as_f64().unwrap(), read[key].as_f64().unwrap());
+            assert!((a / b - 1.0).abs() < 1e-5, "{spec} {key} {a} {b}");
+        }
+        assert_eq!(read["paper"]["caliper"], read["caliper_hull"]);
+    }
+    let fine = answer(&[
+        "shape",
+        "box:1,2,3",
+        "--subdivide",
+        "2",
+        "--scheme",
+        "loop",
+        "-o",
+        &path(&folder, "e.obj"),
+    ]);
+    assert_eq!(fine["triangles"], 12 * 16);
+    let (code, _, error) = stereology(&["shape", "rock:3", "-o", &path(&folder, "a.obj")]);
+    assert!(code == 1 && error.contains("--force"), "{error}");
+}

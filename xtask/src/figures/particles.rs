@@ -74,12 +74,12 @@ pub fn draw_matrix(folder: &Path) -> Result<()> {
 pub fn draw_slices(folder: &Path) -> Result<()> {
     let star = Body::superellipsoid([1.0; 3], [2.6, 2.6])?;
     let mesh = star.mesh().ok_or_else(|| anyhow!("a superellipsoid is a mesh"))?;
-    let normal = UnitVector3::new_normalize(Vector3::new(0.9, 1.0, 1.15));
+    let normal = UnitVector3::new_normalize(Vector3::new(0.96, 1.0, 1.05));
     let path = folder.join("figure-03-slices.svg");
     let root = SVGBackend::new(&path, (1050, 380)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut rows = Vec::new();
-    for (area, depth) in root.split_evenly((1, 3)).iter().zip([0.0, 0.38, 0.5]) {
+    for (area, depth) in root.split_evenly((1, 3)).iter().zip([0.0, 0.38, 0.48]) {
         let profiles = section_polygons(mesh, &normal, depth);
         draw_slice(area, &profiles, &normal, depth)?;
         for (k, profile) in profiles.iter().enumerate() {

@@ -370,19 +370,22 @@ fn throw_planes(
         planes: 0,
         total_squared: 0.0,
     };
-    while batch.hits < wanted {
+    // Until one hit more than wanted, which is not counted: stopping at a hit would make hits seem more frequent than they are.
+    loop {
         if batch.planes > PATIENCE * wanted {
             return Err(SectionLawError::NoSections);
         }
         let normal = UnitVector3::new_normalize(Vector3::from(UnitSphere.sample(rng)));
         let offset = centre.coords.dot(&normal) + radius * (2.0 * rng.random::<f64>() - 1.0);
         let areas = slicer.profile_areas(&normal, offset);
+        if batch.hits == wanted && !areas.is_empty() {
+            return Ok(batch);
+        }
         batch.planes += 1;
         batch.total_squared += areas.iter().sum::<f64>().powi(2);
         batch.hits += usize::from(!areas.is_empty());
         batch.areas.extend(areas);
     }
-    Ok(batch)
 }
 
 /// The batch's profiles up to the area of every node, as lengths of offsets.

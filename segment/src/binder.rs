@@ -145,6 +145,47 @@ impl BinderModel {
         (model, step / (2.0 * spread))
     }
 
+    /// This binder's light and scatter fitted again to a picture of the same scene, such as one at another scale; pixels that are not numbers are left out.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{BinderModel, encoded_image, smooth};
+    ///
+    /// let photo = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([90 + ((x * 7919 ^ y * 104_729) % 21) as u8; 3]));
+    /// let picture = encoded_image(&photo);
+    /// let binder = BinderModel::fit(&picture, None, 0);
+    /// assert!(binder.refit(&smooth(&picture, 2.0)).spread() < 0.5 * binder.spread());
+    /// ```
+    #[must_use]
+    pub fn refit(&self, picture: &Array2<[f32; 3]>) -> Self {
+        let mut samples = sample(picture);
+        samples.retain(|s| s.colour.iter().all(|c| c.is_finite()));
+        let mut model = Self {
+            size: picture.dim(),
+            ..self.clone()
+        };
+        for _ in 0..4 {
+            model.fit_round(&samples, GATE, TERMS);
+        }
+        model
+    }
+
+    /// Fits surface and scatter to the samples within `gate` standard deviations, if there are enough.
+    fn fit_round(&mut self, samples: &[Sample], gate: f64, terms: usize) -> bool {
+        let inside: Vec<&Sample> = samples
+            .iter()
+            .filter(|s| self.squared(s.place, s.colour) < gate * gate)
+            .collect();
+        if inside.len() < 50 {
+            return false;
+        }
+        self.surface = fit_surface(&inside, terms);
+        self.share = inside.len() as f64 / samples.len() as f64;
+        (self.whitening, self.spread) = scatter(self, &inside);
+        true
+    }
+
     /// A binder of one colour and the same scatter in each channel.
     fn flat(colour: [f64; 3], deviation: f64, size: (usize, usize)) -> Self {
         let surface = colour.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -168,16 +209,9 @@ impl BinderModel {
         };
         for (round, terms) in [1, 1, 3, 3, TERMS, TERMS, TERMS, TERMS].into_iter().enumerate() {
             let gate = if round < 2 { 2.0 } else { GATE };
-            let inside: Vec<&Sample> = samples
-                .iter()
-                .filter(|s| model.squared(s.place, s.colour) < gate * gate)
-                .collect();
-            if inside.len() < 50 {
+            if !model.fit_round(samples, gate, terms) {
                 break;
             }
-            model.surface = fit_surface(&inside, terms);
-            model.share = inside.len() as f64 / samples.len() as f64;
-            (model.whitening, model.spread) = scatter(&model, &inside);
         }
         model
     }

@@ -51,6 +51,7 @@
 mod binder;
 mod category;
 mod error;
+mod faint;
 mod finding;
 mod kmeans;
 mod lab;
@@ -68,6 +69,7 @@ mod watershed;
 pub use binder::BinderModel;
 pub use category::{Category, categorise};
 pub use error::SegmentError;
+pub use faint::faint_regions;
 pub use finding::Finding;
 pub use kmeans::{Clusters, kmeans, silhouette};
 pub use lab::{encoded_image, lab, lab_image, smooth};

@@ -9,6 +9,7 @@ use crate::{
     binder::{BinderModel, length, mean_depth},
     category::{Category, categorise},
     error::SegmentError,
+    faint::faint_regions,
     finding::Finding,
     lab::{encoded_image, lab_image, smooth},
     options::{EdgeRule, Holes, SegmentOptions},
@@ -104,12 +105,14 @@ pub fn segment(
     let mut share = binder.share();
     let connected = options.binder.is_some() || surrounds(&distance.mapv(|z| z < low));
     let mut clear = connected && stands_out(&distance, low, high);
+    let mut find_faint = true;
     if !clear && options.binder.is_none() {
         let (tones, apart) = BinderModel::fit_two_tones(&binder.even_light(&colours), options.seed);
         if apart > if connected { TWO_TONES } else { TWO_TONES_IN_PIECES } {
             deviation = tones.deviation(&binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing)));
             distance = deviation.mapv(length);
             (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, tones.share(), true);
+            find_faint = false;
         }
     }
     let mut mask = hysteresis(&distance, low, high);
@@ -124,6 +127,11 @@ pub fn segment(
     // The first outline follows the threshold, so that its cores hold blurred rims; later rounds have cleaner ones.
     for _ in 0..rounds {
         mask = half_contrast(&deviation, &mask);
+    }
+    if find_faint {
+        let faint = faint_regions(&colours, &binder, &mask, [low, high]);
+        mask.zip_mut_with(&faint, |m, z| *m |= *z > 0.0);
+        distance.zip_mut_with(&faint, |d, z| *d = d.max(*z));
     }
     fill(&mut mask);
     open(&mut mask);

@@ -18,6 +18,11 @@ const PART_DEPTH: f32 = 3.0;
 /// Difference of mean colour in Lab below which touching parts are one particle.
 const SAME_COLOUR: f64 = 18.0;
 
+/// Share of a part's outline in common with another from which it is a spot of that one.
+const SPOT: f64 = 0.5;
+/// The same where the colours differ by less than twice what particles must.
+const INLET: f64 = 0.35;
+
 /// Height above the neck, pixels, from which two maxima of the smoothed depth are two particles.
 const LEAST_RISE: f32 = 0.7;
 /// The same as a share of the lower maximum.
@@ -30,6 +35,8 @@ struct Part {
     squares: f64,
     count: f64,
     depth: f32,
+    /// Pixel sides to whatever is no part of it.
+    outline: f64,
 }
 
 impl Part {
@@ -38,6 +45,7 @@ impl Part {
         self.squares += other.squares;
         self.count += other.count;
         self.depth = self.depth.max(other.depth);
+        self.outline += other.outline;
     }
 
     fn mean(&self) -> [f64; 3] {
@@ -81,6 +89,7 @@ pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -
             squares: c.iter().map(|v| v * v).sum::<f64>() * weight,
             count: weight,
             depth: depth[[y, x]],
+            outline: neighbours4([y, x], parts.dim()).filter(|&q| parts[q] != part).count() as f64,
         });
         for q in neighbours4([y, x], parts.dim()) {
             let other = parts[q];
@@ -129,6 +138,7 @@ fn merge(mut known: Vec<Part>, borders: BTreeMap<(u32, u32), f64>) -> Vec<u32> {
             touched[b as usize] = true;
             let part = known[b as usize];
             known[a as usize].add(&part);
+            known[a as usize].outline -= 2.0 * lengths[&(a, b)];
             name[b as usize] = a;
             joined = true;
         }
@@ -149,7 +159,11 @@ fn unlikeness(a: &Part, b: &Part, border: f64) -> Option<f64> {
         // A rim of mixed colour goes where most of its outline is.
         return Some(difference / (1.0 + border));
     }
-    (difference < SAME_COLOUR.max(2.5 * texture)).then_some(1000.0 + difference)
+    // Sections of particles touch at points; a spot inside a particle or in its rim has its outline in common with it.
+    let contact = border / a.outline.min(b.outline).max(1.0);
+    let limit = SAME_COLOUR.max(2.5 * texture);
+    let same = difference < limit || contact > SPOT || (contact > INLET && difference < 2.0 * limit);
+    same.then_some(1000.0 + difference)
 }
 
 /// Mask of the parts with lines one pixel wide between those that touch.

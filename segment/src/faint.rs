@@ -1,0 +1,139 @@
+//! Faint particles: what differs from the binder by less than its texture, seen where texture is averaged away.
+
+use ndarray::Array2;
+
+use crate::{
+    binder::{BinderModel, length},
+    lab::smooth,
+    refine::half_contrast,
+    regions::{connected_pieces, hysteresis, neighbours8, open},
+    watershed::smooth_field,
+};
+
+/// Pixels in the side of a cell of the coarse picture.
+const CELL: usize = 2;
+/// Standard deviation of the coarse smoothing, cells.
+const SIGMA: f32 = 1.5;
+/// Least share of the smoothing's weight that must lie in the binder's part of the picture.
+const KNOWN: f32 = 0.25;
+/// Least area of a faint region, pixels: about that of the smoothing.
+const LEAST: usize = 60;
+
+/// Regions outside a mask that stand out from the binder only over many pixels, and how far: their distance to the binder at that scale, 0 elsewhere.
+///
+/// The picture is averaged over some six pixels, those of the mask and its rim left out, so that neither texture nor the colours of particles already found cover what is faint; the binder's light and scatter
+/// are fitted again at that scale, and the thresholds are the same number of standard deviations.
+///
+/// # Complexity
+///
+/// Linear in pixels.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array2;
+/// use stereology_segment::{BinderModel, encoded_image, faint_regions};
+///
+/// // Texture of ± 12 levels, a square 16 levels lighter.
+/// let photo = image::RgbImage::from_fn(120, 120, |x, y| {
+///     let inside = (40..80).contains(&x) && (40..80).contains(&y);
+///     let texture = (x * 7919 ^ (y * 104_729 + x * y * 31)) % 25;
+///     image::Rgb([(if inside { 116 } else { 100 }) + texture as u8; 3])
+/// });
+/// let picture = encoded_image(&photo);
+/// let binder = BinderModel::fit(&picture, None, 0);
+/// assert!(binder.distance(&picture)[[60, 60]] < 5.0);
+/// let distance = faint_regions(&picture, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0]);
+/// let found = distance.iter().filter(|z| **z > 0.0).count();
+/// assert!(distance[[60, 60]] > 9.0 && (1500..1700).contains(&found), "{found}");
+/// ```
+#[must_use]
+pub fn faint_regions(
+    picture: &Array2<[f32; 3]>,
+    binder: &BinderModel,
+    mask: &Array2<bool>,
+    [low, high]: [f32; 2],
+) -> Array2<f32> {
+    let dim = picture.dim();
+    let none = Array2::zeros(dim);
+    let coarse = averaged(picture, binder, mask);
+    let known: Array2<[f32; 3]> = coarse.mapv(|c| c.unwrap_or([f32::NAN; 3]));
+    let model = binder.refit(&known);
+    let deviation = model
+        .deviation(&known)
+        .mapv(|d| if d[0].is_finite() { d } else { [0.0; 3] });
+    let candidates = hysteresis(&deviation.mapv(length), low, high);
+    if candidates.iter().all(|c| !c) {
+        return none;
+    }
+    let fine = enlarged(&deviation, dim);
+    let mut faint = Array2::from_shape_fn(dim, |(y, x)| {
+        let cell = [(y / CELL).min(candidates.dim().0 - 1), (x / CELL).min(candidates.dim().1 - 1)];
+        candidates[cell]
+    });
+    for _ in 0..2 {
+        faint = half_contrast(&fine, &faint);
+    }
+    faint.zip_mut_with(mask, |f, m| *f &= !m);
+    open(&mut faint);
+    let (pieces, count) = connected_pieces(&faint, |f| f);
+    let mut areas = vec![0_usize; count as usize + 1];
+    pieces.iter().for_each(|&p| areas[p as usize] += 1);
+    Array2::from_shape_fn(dim, |p| {
+        if faint[p] && areas[pieces[p] as usize] >= LEAST {
+            length(fine[p])
+        } else {
+            0.0
+        }
+    })
+}
+
+/// Mean colours of cells and their surroundings, without the mask and its rim; `None` where hardly anything else is near. Light is taken out before and put back after, so that its slope survives lopsided means.
+fn averaged(picture: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool>) -> Array2<Option<[f32; 3]>> {
+    let (height, width) = picture.dim();
+    let cells = (height.div_ceil(CELL), width.div_ceil(CELL));
+    let square = |[j, i]: [usize; 2]| {
+        let rows = j * CELL..((j + 1) * CELL).min(height);
+        let columns = i * CELL..((i + 1) * CELL).min(width);
+        rows.flat_map(move |y| columns.clone().map(move |x| (y, x)))
+    };
+    let taken = Array2::from_shape_fn(cells, |(j, i)| square([j, i]).any(|p| mask[p]));
+    let open_cell = Array2::from_shape_fn(cells, |(j, i)| {
+        !taken[[j, i]] && !neighbours8([j, i], cells).any(|q| taken[q])
+    });
+    let mut sums = Array2::from_elem(cells, [0.0_f32; 3]);
+    for ((j, i), sum) in sums.indexed_iter_mut().filter(|(p, _)| open_cell[*p]) {
+        let light = binder.light(i * CELL, j * CELL);
+        let mut count = 0.0;
+        for p in square([j, i]) {
+            (0..3).for_each(|c| sum[c] += picture[p][c] - light[c]);
+            count += 1.0;
+        }
+        sum.iter_mut().for_each(|s| *s /= count);
+    }
+    let sums = smooth(&sums, SIGMA);
+    let weights = smooth_field(&open_cell.mapv(|o| f32::from(u8::from(o))), SIGMA);
+    Array2::from_shape_fn(cells, |(j, i)| {
+        let weight = weights[[j, i]];
+        let light = binder.light(i * CELL, j * CELL);
+        (weight >= KNOWN).then(|| std::array::from_fn(|c| light[c] + sums[[j, i]][c] / weight))
+    })
+}
+
+/// Field of cells at every pixel, linear between the cells' centres.
+fn enlarged(field: &Array2<[f32; 3]>, dim: (usize, usize)) -> Array2<[f32; 3]> {
+    let (rows, columns) = field.dim();
+    let between = |i: usize, n: usize| {
+        let at = ((i as f32 + 0.5) / CELL as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+        let low = (at as usize).min(n.saturating_sub(2));
+        (low, (low + 1).min(n - 1), at - low as f32)
+    };
+    Array2::from_shape_fn(dim, |(y, x)| {
+        let ((u, d, v), (l, r, h)) = (between(y, rows), between(x, columns));
+        std::array::from_fn(|c| {
+            let top = field[[u, l]][c] + h * (field[[u, r]][c] - field[[u, l]][c]);
+            let bottom = field[[d, l]][c] + h * (field[[d, r]][c] - field[[d, l]][c]);
+            top + v * (bottom - top)
+        })
+    })
+}

@@ -129,7 +129,7 @@ pub fn segment(
         mask = half_contrast(&deviation, &mask);
     }
     if find_faint {
-        let faint = faint_regions(&colours, &binder, &mask, [low, high]);
+        let faint = faint_regions(&colours, &binder, &mask, [FAINT * low, FAINT * high]);
         mask.zip_mut_with(&faint, |m, z| *m |= *z > 0.0);
         distance.zip_mut_with(&faint, |d, z| *d = d.max(*z));
     }
@@ -349,6 +349,8 @@ impl Segmentation {
 
 /// Change of the number of regions, percent of the profiles, that is worth a warning.
 const UNSTABLE: f64 = 25.0;
+/// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
+const FAINT: f32 = 0.7;
 /// Rounds of refining outlines: the third moves them by less than a tenth of a pixel.
 const ROUNDS: usize = 3;
 /// Holes of less than a twentieth of their region's area are filled before it is cut.

@@ -171,6 +171,27 @@ impl BinderModel {
         model
     }
 
+    /// The same binder with at least `deviation`, sRGB / 255, of scatter in every direction of colour. Photos keep hue at half the resolution of lightness, and binders scatter little in hue: outlines drawn with
+    /// the true scatter would follow hue alone.
+    #[must_use]
+    pub fn blunted(&self, deviation: f64) -> Self {
+        let [[a, ..], [b, c, _], [d, e, f]] = self.whitening;
+        // Inverse of the lower triangle W, whose product with its transpose is Σ.
+        let (l00, l11, l22) = (1.0 / a, 1.0 / c, 1.0 / f);
+        let l10 = -b * l00 * l11;
+        let l21 = -e * l11 * l22;
+        let l20 = -(d * l00 + e * l10) * l22;
+        let covariance = [
+            [l00 * l00, 0.0, 0.0],
+            [l10 * l00, l10 * l10 + l11 * l11, 0.0],
+            [l20 * l00, l20 * l10 + l21 * l11, l20 * l20 + l21 * l21 + l22 * l22],
+        ];
+        Self {
+            whitening: inverse_factor(&covariance, deviation * deviation),
+            ..self.clone()
+        }
+    }
+
     /// Fits surface and scatter to the samples within `gate` standard deviations, if there are enough.
     fn fit_round(&mut self, samples: &[Sample], gate: f64, terms: usize) -> bool {
         let inside: Vec<&Sample> = samples

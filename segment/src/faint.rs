@@ -72,7 +72,7 @@ pub fn faint_regions(
         candidates[cell]
     });
     for _ in 0..2 {
-        faint = half_contrast(&fine, &faint);
+        faint = half_contrast(&fine, &faint, CELL as f32 * SIGMA);
     }
     faint.zip_mut_with(mask, |f, m| *f &= !m);
     open(&mut faint);

@@ -4,10 +4,16 @@ use std::collections::VecDeque;
 
 use ndarray::Array2;
 
-use crate::{regions::neighbours4, watershed::distance_transform};
+use crate::{regions::{connected_pieces, neighbours4}, watershed::distance_transform};
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 const CORE_DEPTH: f32 = 3.0;
+/// Pixels that an outline may move out in one call.
+const REACH: u8 = 2;
+/// 1 / (2 √(2π)): what a unit of curvature times blur takes from half the contrast.
+const HALF_EDGE: f32 = 0.5 * 0.199_471_1;
+/// Most that curvature may take away: beyond, the first order is no guide.
+const MOST_CURVED: f32 = 0.12;
 
 /// For each pixel of a mask and of a rim around it, the colour of the particle core it belongs to.
 ///
@@ -18,7 +24,7 @@ pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8
     let dim = mask.dim();
     let depth = distance_transform(mask);
     let around = widest(&depth, 3);
-    let core = Array2::from_shape_fn(dim, |p| mask[p] && depth[p] >= CORE_DEPTH.min(0.75 * around[p]));
+    let core = Array2::from_shape_fn(dim, |p| mask[p] && depth[p] >= CORE_DEPTH.min(0.9 * around[p]));
     let mut out = Array2::from_elem(dim, None);
     let mut queue = VecDeque::new();
     for ((y, x), _) in core.indexed_iter().filter(|(_, c)| **c) {
@@ -56,8 +62,10 @@ pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8
 /// # Formula
 ///
 /// ```text
-/// keep p  ⇔  (p − b)·(c − b) ≥ ½ |c − b|²        b binder, c core; differences scaled by the binder's scatter
+/// keep p  ⇔  (p − b)·(c − b) ≥ (½ − s / (2 R √(2π))) |c − b|²        b binder, c core; differences scaled by the binder's scatter
 /// ```
+///
+/// The edge of a disc of radius R is blurred below a half: to first order by s / (2 R √(2π)), s the standard deviation of the blur. R is that of the largest disc inside the region.
 ///
 /// # Complexity
 ///
@@ -70,12 +78,13 @@ pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8
 /// // A blurred edge at x = 10, a mask that reaches one pixel too far out.
 /// let ramp = Array2::from_shape_fn((8, 24), |(_, x)| [20.0 / (1.0 + (-(x as f32 - 9.5)).exp()), 0.0, 0.0]);
 /// let mask = Array2::from_shape_fn((8, 24), |(_, x)| x >= 9);
-/// let refined = stereology_segment::half_contrast(&ramp, &mask);
+/// let refined = stereology_segment::half_contrast(&ramp, &mask, 0.0);
 /// assert!(refined.indexed_iter().all(|((_, x), &m)| m == (x >= 10)));
 /// ```
 #[must_use]
-pub fn half_contrast(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>) -> Array2<bool> {
-    let cores = core_colours(deviation, mask, 2);
+pub fn half_contrast(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, blur: f32) -> Array2<bool> {
+    let cores = core_colours(deviation, mask, REACH);
+    let radius = widest(&largest_depth(mask), usize::from(REACH));
     Array2::from_shape_fn(mask.dim(), |p| {
         cores[p].is_some_and(|c| {
             let d = deviation[p];
@@ -83,9 +92,23 @@ pub fn half_contrast(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>) -> Array
                 d[0] * c[0] + d[1] * c[1] + d[2] * c[2],
                 c[0] * c[0] + c[1] * c[1] + c[2] * c[2],
             );
-            along >= 0.5 * step
+            let curvature = HALF_EDGE * blur / radius[p].max(1.0);
+            along >= (0.5 - curvature.min(MOST_CURVED)) * step
         })
     })
+}
+
+/// Greatest distance to the outside in the piece of a mask that each pixel belongs to, 0 outside.
+fn largest_depth(mask: &Array2<bool>) -> Array2<f32> {
+    let depth = distance_transform(mask);
+    let (pieces, count) = connected_pieces(mask, |m| m);
+    let mut largest = vec![0.0_f32; count as usize + 1];
+    for (&piece, &d) in pieces.iter().zip(&depth) {
+        let l = &mut largest[piece as usize];
+        *l = l.max(d);
+    }
+    largest[0] = 0.0;
+    pieces.mapv(|p| largest[p as usize])
 }
 
 /// Largest value of a field in the square of `radius` around each pixel.

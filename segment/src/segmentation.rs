@@ -98,6 +98,7 @@ pub fn segment(
     report(0.3)?;
     let mut deviation = binder.deviation(&colours);
     let mut distance = deviation.mapv(length);
+    deviation = binder.blunted(HUE_SCATTER).deviation(&colours);
     let [low, mut high] = options.thresholds;
     let mut rounds = ROUNDS;
     // Holes in a whole region may be binder between particles that touch: only small ones are filled before it is cut.
@@ -125,8 +126,9 @@ pub fn segment(
     fill(&mut mask);
     open(&mut mask);
     // The first outline follows the threshold, so that its cores hold blurred rims; later rounds have cleaner ones.
+    let blur = options.smoothing.hypot(SHARP);
     for _ in 0..rounds {
-        mask = half_contrast(&deviation, &mask);
+        mask = half_contrast(&deviation, &mask, blur);
     }
     if find_faint {
         let faint = faint_regions(&colours, &binder, &mask, [FAINT * low, FAINT * high]);
@@ -139,7 +141,7 @@ pub fn segment(
     let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
     report(0.75)?;
     let mut labels = split_by_shape(&parts);
-    drop_faint(&mut labels, &distance, high, options.min_area);
+    drop_faint(&mut labels, &distance, &deviation, high, options.min_area);
     if options.holes == Holes::Fill {
         fill_label_holes(&mut labels);
     }
@@ -351,6 +353,12 @@ impl Segmentation {
 const UNSTABLE: f64 = 25.0;
 /// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
 const FAINT: f32 = 0.7;
+/// Least scatter, sRGB / 255, while outlines are drawn: four levels.
+const HUE_SCATTER: f64 = 4.0 / 255.0;
+/// Mean difference of a small profile to the binder, in standard deviations of the binder and [`HUE_SCATTER`], from which it is one.
+const VISIBLE: f64 = 2.5;
+/// Standard deviation of the blur of a sharp photo, pixels.
+const SHARP: f32 = 0.8;
 /// Rounds of refining outlines: the third moves them by less than a tenth of a pixel.
 const ROUNDS: usize = 3;
 /// Holes of less than a twentieth of their region's area are filled before it is cut.
@@ -388,17 +396,20 @@ fn stands_out(distance: &Array2<f32>, low: f32, high: f32) -> bool {
     beyond as f64 > 0.6 * between as f64
 }
 
-/// Takes away labels of fewer than eight times `least` pixels of which less than a tenth is at least `high` from the binder: flecks of its texture.
-fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, high: f32, least: usize) {
+/// Takes away labels of fewer than eight times `least` pixels that are flecks of the binder's texture, of which less than a tenth is at least `high` from the binder, or of the photo's compression, whose mean
+/// difference is hardly visible.
+fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, blunted: &Array2<[f32; 3]>, high: f32, least: usize) {
     let count = labels.iter().copied().max().unwrap_or(0) as usize + 1;
-    let mut sums = vec![(0_usize, 0_usize); count];
-    for (&label, z) in labels.iter().zip(distance) {
-        sums[label as usize].0 += usize::from(*z >= high);
-        sums[label as usize].1 += 1;
+    let mut sums = vec![(0_usize, 0_usize, 0.0_f64); count];
+    for ((&label, z), d) in labels.iter().zip(distance).zip(blunted) {
+        let sum = &mut sums[label as usize];
+        sum.0 += usize::from(*z >= high);
+        sum.1 += 1;
+        sum.2 += f64::from(length(*d));
     }
     let kept: Vec<bool> = sums
         .iter()
-        .map(|&(strong, all)| all >= 8 * least || 10 * strong >= all)
+        .map(|&(strong, all, seen)| all >= 8 * least || (10 * strong >= all && seen >= VISIBLE * all as f64))
         .collect();
     labels.mapv_inplace(|l| if l != 0 && kept[l as usize] { l } else { 0 });
 }

@@ -28,6 +28,9 @@ const LEAST_RISE: f32 = 0.7;
 /// The same as a share of the lower maximum.
 const RELATIVE_RISE: f32 = 0.1;
 
+/// The same for maxima at the photo's edge.
+const CUT_RISE: f32 = 0.3;
+
 /// What is known of a part of a region.
 #[derive(Clone, Copy, Default)]
 struct Part {
@@ -188,7 +191,12 @@ pub fn split_by_shape(parts: &Array2<u32>) -> Array2<u32> {
     let mask = lined(parts);
     let mut depth = smooth_field(&distance_transform(&mask), 1.0);
     depth.zip_mut_with(&mask, |d, &m| *d = if m { d.min(1e4) } else { 0.0 });
-    let markers = h_maxima(&depth, |height| LEAST_RISE.max(RELATIVE_RISE * height));
+    let (height, width) = parts.dim();
+    let markers = h_maxima(&depth, |[y, x], rise| {
+        // Of a strip cut off by the photo's edge the ridge lies beyond: what is seen of it says little of necks.
+        let cut = y == 0 || x == 0 || y + 1 == height || x + 1 == width;
+        LEAST_RISE.max(if cut { CUT_RISE } else { RELATIVE_RISE } * rise)
+    });
     let mut labels = watershed(&depth, &markers, &mask);
     // The lines between parts go back to the part they were taken from.
     for _ in 0..3 {

@@ -133,7 +133,7 @@ pub fn smooth_field(field: &Array2<f32>, sigma: f32) -> Array2<f32> {
     out
 }
 
-/// Maxima of a positive field that stand at least `h(height)` above the saddle to any higher one: a number from 1 for each at its peak pixel, in order of decreasing height, 0 elsewhere.
+/// Maxima of a positive field that stand at least `h(place, height)`, place being (y, x), above the saddle to any higher one: a number from 1 for each at its peak pixel, in order of decreasing height, 0 elsewhere.
 ///
 /// Pixels are taken from the highest down and joined; where two hills meet, the lower one ends if it stands out less than `h` of its height. Heights are compared in steps of 1/64.
 ///
@@ -145,11 +145,11 @@ pub fn smooth_field(field: &Array2<f32>, sigma: f32) -> Array2<f32> {
 ///
 /// ```
 /// let field = ndarray::array![[1.0_f32, 3.0, 2.5, 2.8, 1.0, 5.0]];
-/// let peaks = stereology_segment::h_maxima(&field, |_| 1.0);
+/// let peaks = stereology_segment::h_maxima(&field, |_, _| 1.0);
 /// assert_eq!(peaks, ndarray::array![[0, 2, 0, 0, 0, 1]]);
 /// ```
 #[must_use]
-pub fn h_maxima(field: &Array2<f32>, h: impl Fn(f32) -> f32) -> Array2<u32> {
+pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Array2<u32> {
     const NONE: u32 = u32::MAX;
     let (_, width) = field.dim();
     let quantised = |v: f32| (v.clamp(0.0, 16_000.0) * 64.0) as usize;
@@ -196,7 +196,7 @@ pub fn h_maxima(field: &Array2<f32>, h: impl Fn(f32) -> f32) -> Array2<u32> {
             } else {
                 (this, other)
             };
-            if low != i && height(low) - height(i) >= h(height(low)) {
+            if low != i && height(low) - height(i) >= h([low as usize / width, low as usize % width], height(low)) {
                 peaks.push(low);
             }
             ended[low as usize] = true;

@@ -75,8 +75,8 @@ pub enum SegmentError {
         /// Connected pieces of the values 1 and 2.
         pieces: usize,
     },
-    /// The label file's samples are no whole numbers of one channel.
-    #[error("{}: {reason}; give one channel of whole numbers, 0 for the binder (u8, u16, u32 or i32 TIFF, u8 or u16 PNG)", path.display())]
+    /// The label file cannot be read as labels, or written.
+    #[error("{}: {reason}", path.display())]
     LabelFormat {
         /// File as given.
         path: PathBuf,

@@ -68,7 +68,10 @@ pub fn faint_regions(
     }
     let fine = enlarged(&deviation, dim);
     let mut faint = Array2::from_shape_fn(dim, |(y, x)| {
-        let cell = [(y / CELL).min(candidates.dim().0 - 1), (x / CELL).min(candidates.dim().1 - 1)];
+        let cell = [
+            (y / CELL).min(candidates.dim().0 - 1),
+            (x / CELL).min(candidates.dim().1 - 1),
+        ];
         candidates[cell]
     });
     for _ in 0..2 {

@@ -1,28 +1,72 @@
-//! Label maps in files: one number a profile, 0 for the binder.
+//! Label maps in files: one number a profile, 0 for the binder; or outlines of the profiles.
 
 use std::{
-    io::{Cursor, Seek, Write},
+    io::{self, BufReader, Cursor},
     path::Path,
 };
 
-use image::DynamicImage;
 use ndarray::{Array2, ArrayView2};
+use serde_json::Value;
 use stereology_grid::write_atomically;
-use tiff::{
-    decoder::{Decoder, DecodingResult, Limits},
-    encoder::{TiffEncoder, colortype},
+
+use crate::{
+    coco,
+    error::SegmentError,
+    finding::Finding,
+    geojson, imagej_roi,
+    label_raster::{dimensions, ending, narrow, parse_npy, parse_png, parse_tiff, write_npy, write_tiff},
+    outline::{Outline, fill_outlines, outlines},
+    photo::read_bytes,
 };
 
-use crate::{error::SegmentError, photo::read_bytes};
+/// A label map from a file, and what to know about how it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelFile {
+    /// Axes (y, x); 0 is the binder.
+    pub labels: Array2<u32>,
+    /// `first-page`, `overlapping-labels`, `lost-labels`.
+    pub findings: Vec<Finding>,
+}
 
-/// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
-const LARGEST_MAP: usize = 1_600_000_000;
-
-/// Reads a label map, axes (y, x): TIFF of u8, u16, u32 or i32, or PNG of u8 or u16, as ImageGrains, StarDist, Cellpose and ImageJ write them. 0 is the binder.
+/// Reads a label map for a photo of `size` pixels, (height, width), whatever tool made it; the kind of file is told by its contents.
+///
+/// | file | from | |
+/// |---|---|---|
+/// | TIFF, 1 to 64 bits | ImageGrains, StarDist, Cellpose, ImageJ, napari | stored numbers, never inverted for display; floats if whole; first page |
+/// | PNG, 1 to 16 bits, grey or palette | Cellpose, VOC | stored numbers or palette indices |
+/// | .npy | NumPy, Cellpose | whole numbers of any kind, two axes |
+/// | GeoJSON polygons | segmenteverygrain, QGIS | x column, y row, pixel centres at whole numbers; where all y ≤ 0, QGIS's: y up, pixel corners at whole numbers |
+/// | ImageJ regions, .zip or .roi | Fiji's ROI manager, StarDist | polygons, rectangles, ovals, paths; points and lines are left out |
+/// | COCO annotations | labelling tools, networks | polygons and coded masks of the one picture of the photo's size |
 ///
 /// # Errors
 ///
-/// The file cannot be opened or decoded, or does not hold one channel of whole numbers of at least 0.
+/// The file cannot be opened or is damaged; its numbers are no labels; it holds pickled objects; outlines reach beyond the photo. Label arrays of another size are refused by [`crate::Segmentation::from_labels`].
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::array;
+/// use stereology_segment::{read_labels_for, write_labels};
+///
+/// # let folder = tempfile::tempdir()?;
+/// let labels = array![[0, 1, 1], [0, 0, 70_000_u32]];
+/// for name in ["l.tif", "l.npy", "l.geojson", "l.zip", "l.json"] {
+///     let file = folder.path().join(name);
+///     write_labels(&file, labels.view())?;
+///     assert_eq!(read_labels_for(&file, labels.dim())?.labels, labels);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_labels_for(path: impl AsRef<Path>, size: (usize, usize)) -> Result<LabelFile, SegmentError> {
+    read(path.as_ref(), Some(size))
+}
+
+/// Reads a label map that knows its size, axes (y, x), 0 the binder: TIFF, PNG or .npy. See [`read_labels_for`], which reads outlines too and says what it noticed.
+///
+/// # Errors
+///
+/// As [`read_labels_for`]; and for files of outlines, which do not tell the photo's size.
 ///
 /// # Examples
 ///
@@ -31,123 +75,142 @@ const LARGEST_MAP: usize = 1_600_000_000;
 /// use stereology_segment::{read_labels, write_labels};
 ///
 /// # let folder = tempfile::tempdir()?;
-/// let file = folder.path().join("labels.tif");
-/// let labels = array![[0, 1, 1], [0, 0, 70_000_u32]];
+/// let file = folder.path().join("labels.png");
+/// let labels = array![[0, 1, 1], [0, 0, 65_535_u32]];
 /// write_labels(&file, labels.view())?;
 /// assert_eq!(read_labels(&file)?, labels);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_labels(path: impl AsRef<Path>) -> Result<Array2<u32>, SegmentError> {
-    let path = path.as_ref();
+    Ok(read(path.as_ref(), None)?.labels)
+}
+
+fn read(path: &Path, size: Option<(usize, usize)>) -> Result<LabelFile, SegmentError> {
     let bytes = read_bytes(path)?;
-    if bytes.starts_with(b"II*\0")
-        || bytes.starts_with(b"MM\0*")
-        || bytes.starts_with(b"II+\0")
-        || bytes.starts_with(b"MM\0+")
+    let refuse = |reason: String| SegmentError::LabelFormat {
+        path: path.into(),
+        reason,
+    };
+    let plain = |labels| LabelFile {
+        labels,
+        findings: Vec::new(),
+    };
+    let starts = |start: &[u8]| bytes.starts_with(start);
+    if [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
+        .iter()
+        .any(|magic| starts(*magic))
     {
-        return read_tiff(path, &bytes);
+        let (labels, findings) = parse_tiff(&bytes).map_err(refuse)?;
+        return Ok(LabelFile { labels, findings });
     }
-    let refuse = |reason: String| SegmentError::Decode {
-        path: path.into(),
-        reason,
-    };
-    let picture = image::load_from_memory(&bytes).map_err(|e| refuse(e.to_string()))?;
-    let shape = (picture.height() as usize, picture.width() as usize);
-    let samples: Vec<u32> = match picture {
-        DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(u32::from).collect(),
-        DynamicImage::ImageLuma16(p) => p.into_raw().into_iter().map(u32::from).collect(),
-        other => return Err(format_error(path, format!("the pixels are {:?}", other.color()))),
-    };
-    shaped(path, shape, samples)
-}
-
-fn format_error(path: &Path, reason: String) -> SegmentError {
-    SegmentError::LabelFormat {
-        path: path.into(),
-        reason,
+    if starts(b"\x89PNG") {
+        return Ok(plain(parse_png(&bytes).map_err(refuse)?));
     }
-}
-
-fn shaped(path: &Path, shape: (usize, usize), samples: Vec<u32>) -> Result<Array2<u32>, SegmentError> {
-    let (found, wanted) = (samples.len(), shape.0 * shape.1);
-    Array2::from_shape_vec(shape, samples).map_err(|_| {
-        format_error(
-            path,
-            format!("{found} samples for {wanted} pixels: more than one channel"),
-        )
-    })
-}
-
-fn read_tiff(path: &Path, bytes: &[u8]) -> Result<Array2<u32>, SegmentError> {
-    let refuse = |e: tiff::TiffError| SegmentError::Decode {
-        path: path.into(),
-        reason: e.to_string(),
-    };
-    // A header may claim any size; no map of ours is larger than this.
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = LARGEST_MAP;
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(refuse)?.with_limits(limits);
-    let (width, height) = decoder.dimensions().map_err(refuse)?;
-    let samples: Vec<u32> = match decoder.read_image().map_err(refuse)? {
-        DecodingResult::U8(v) => v.into_iter().map(u32::from).collect(),
-        DecodingResult::U16(v) => v.into_iter().map(u32::from).collect(),
-        DecodingResult::U32(v) => v,
-        DecodingResult::I32(v) => v
-            .into_iter()
-            .map(|l| u32::try_from(l).map_err(|_| format_error(path, format!("the label {l} is negative"))))
-            .collect::<Result<_, _>>()?,
-        DecodingResult::I16(v) => v
-            .into_iter()
-            .map(|l| u32::try_from(l).map_err(|_| format_error(path, format!("the label {l} is negative"))))
-            .collect::<Result<_, _>>()?,
-        _ => {
-            return Err(format_error(
-                path,
-                "the samples are not 8-, 16- or 32-bit whole numbers".into(),
-            ));
+    if starts(b"\x93NUMPY") {
+        return Ok(plain(parse_npy(&bytes).map_err(refuse)?));
+    }
+    if starts(b"\x80") {
+        return Err(refuse("it is a pickled Python object, which may run code when read; save the label array itself as TIFF, PNG or .npy".into()));
+    }
+    let zipped = starts(b"PK");
+    let text = bytes
+        .iter()
+        .find(|b| !b.is_ascii_whitespace() && !b"\xef\xbb\xbf".contains(b));
+    if !zipped && !starts(imagej_roi::MAGIC) && text != Some(&b'{') {
+        return Err(refuse("its first bytes are of no known kind of label file; give a TIFF, a PNG, a .npy array, GeoJSON or COCO polygons, or an ImageJ ROI zip".into()));
+    }
+    let size = size.ok_or_else(|| refuse("outlines do not tell the photo's size; give the photo as well".into()))?;
+    let mut without_area = 0;
+    let found = if zipped {
+        let (found, lines) = imagej_roi::parse_archive(&bytes).map_err(refuse)?;
+        without_area = lines;
+        found
+    } else if starts(imagej_roi::MAGIC) {
+        let pieces = imagej_roi::parse(&bytes).map_err(refuse)?;
+        let outline = pieces.map(|pieces| Outline { id: 1, pieces });
+        outline.into_iter().collect()
+    } else {
+        let start = bytes.iter().position(|b| *b == b'{').unwrap_or(0);
+        let json: Value = serde_json::from_reader(BufReader::new(&bytes[start..]))
+            .map_err(|e| refuse(format!("is no JSON ({e})")))?;
+        if json.get("annotations").is_some() {
+            coco::parse(&json, size).map_err(refuse)?
+        } else {
+            geojson::parse(&json).map_err(refuse)?
         }
     };
-    shaped(path, (height as usize, width as usize), samples)
+    drawn(&found, without_area, size).map_err(refuse)
 }
 
-/// Writes a label map as a TIFF of one page, u16 where the largest label fits and u32 otherwise; the file appears whole or not at all.
+/// Outlines as a map, with what was lost on the way.
+fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)) -> Result<LabelFile, String> {
+    let corners = || found.iter().flat_map(|o| o.pieces.iter().flatten().flatten());
+    let beyond = corners()
+        .find(|c| !(c[0] >= -2.0 && c[1] >= -2.0 && c[0] <= width as f64 + 2.0 && c[1] <= height as f64 + 2.0));
+    if let Some([x, y]) = beyond {
+        return Err(format!(
+            "an outline reaches to x = {x}, y = {y}, but the photo is {width}x{height} pixels; export outlines in pixels of this photo, not turned, cropped or in map units"
+        ));
+    }
+    let (labels, overlap) = fill_outlines(found, (height, width));
+    let mut findings = Vec::new();
+    if overlap > 0 {
+        findings.push(Finding::new(
+            "overlapping-labels",
+            format!("{overlap} pixels lie in more than one outline; they were given to the smaller one"),
+        ));
+    }
+    let drawn = crate::profile::distinct(&labels).len();
+    let lost = found.len() - drawn + without_area;
+    if lost > 0 {
+        findings.push(Finding::new("lost-labels", format!("{lost} of {} outlines hold no pixel's centre of their own (points, lines, slivers, or covered by others) and are left out", found.len() + without_area)));
+    }
+    Ok(LabelFile { labels, findings })
+}
+
+/// Writes a label map in the kind of file its ending says: .tif or .tiff (u16 where the largest label fits, else u32), .png (u16), .npy (u32), .geojson, .zip (ImageJ regions), .json (COCO); the file appears
+/// whole or not at all.
 ///
 /// # Errors
 ///
-/// The file cannot be written.
+/// The file cannot be written; another ending; a label beyond 65,535 for a PNG, or a map beyond 32,767 pixels for ImageJ's regions.
 ///
 /// # Examples
 ///
-/// See [`read_labels`].
+/// See [`read_labels_for`].
 pub fn write_labels(path: impl AsRef<Path>, labels: ArrayView2<'_, u32>) -> Result<(), SegmentError> {
-    let largest = labels.iter().copied().max().unwrap_or(0);
-    let (width, height) = dimensions(labels.dim());
-    let small: Option<Vec<u16>> = if largest <= u32::from(u16::MAX) {
-        labels.iter().map(|&l| u16::try_from(l).ok()).collect()
-    } else {
-        None
+    let path = path.as_ref();
+    let refuse = |reason: &str| {
+        Err(SegmentError::LabelFormat {
+            path: path.into(),
+            reason: reason.into(),
+        })
     };
-    let write = |out: &mut dyn WriteSeek| -> tiff::TiffResult<()> {
-        let mut encoder = TiffEncoder::new(out)?;
-        match &small {
-            Some(samples) => encoder.write_image::<colortype::Gray16>(width, height, samples),
-            None => {
-                let samples: Vec<u32> = labels.iter().copied().collect();
-                encoder.write_image::<colortype::Gray32>(width, height, &samples)
-            }
+    let (height, width) = labels.dim();
+    let rings = || outlines(&labels.to_owned());
+    match ending(path).as_str() {
+        "tif" | "tiff" => write_atomically(path, |out| write_tiff(out, labels).map_err(io::Error::other))?,
+        "png" => {
+            let Some(samples) = narrow(labels) else {
+                return refuse("a PNG holds labels up to 65,535, and these go beyond; write a TIFF or a .npy");
+            };
+            let (w, h) = dimensions((height, width));
+            let Some(picture) = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(w, h, samples) else {
+                return refuse("the map is too large for a PNG");
+            };
+            let mut bytes = Cursor::new(Vec::new());
+            let encoded = picture.write_to(&mut bytes, image::ImageFormat::Png);
+            write_atomically(path, |out| {
+                encoded.map_err(io::Error::other)?;
+                io::Write::write_all(out, bytes.get_ref())
+            })?;
         }
-    };
-    Ok(write_atomically(path, |out| write(out).map_err(std::io::Error::other))?)
-}
-
-/// What a TIFF encoder writes to.
-pub(crate) trait WriteSeek: Write + Seek {}
-impl<T: Write + Seek> WriteSeek for T {}
-
-/// Width and height of an array (y, x); a picture in memory has fewer than 2³² rows and columns.
-pub(crate) fn dimensions((height, width): (usize, usize)) -> (u32, u32) {
-    (
-        u32::try_from(width).unwrap_or(u32::MAX),
-        u32::try_from(height).unwrap_or(u32::MAX),
-    )
+        "npy" => write_atomically(path, |out| write_npy(out, labels))?,
+        "geojson" => write_atomically(path, |out| geojson::write(out, &rings()))?,
+        "json" => write_atomically(path, |out| coco::write(out, &rings(), (height, width)))?,
+        "zip" if height.max(width) > 32_767 => return refuse("ImageJ's regions reach to 32,767 pixels; write a TIFF"),
+        "zip" => write_atomically(path, |out| imagej_roi::write(out, &rings()))?,
+        _ => return refuse("the ending is none of .tif, .png, .npy, .geojson, .json (COCO), .zip (ImageJ regions)"),
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use stereology_grid::write_atomically;
 use tiff::encoder::{TiffEncoder, colortype};
 
 use crate::{
-    error::SegmentError, label_map::dimensions, profile::Index, regions::neighbours4, segmentation::Segmentation,
+    error::SegmentError, label_raster::dimensions, profile::Index, regions::neighbours4, segmentation::Segmentation,
 };
 
 /// Colours of the outlines of categories: Okabe & Ito's, which colour-blind readers can tell apart, black left out.

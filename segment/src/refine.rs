@@ -4,7 +4,10 @@ use std::collections::VecDeque;
 
 use ndarray::Array2;
 
-use crate::{regions::{connected_pieces, neighbours4}, watershed::distance_transform};
+use crate::{
+    regions::{connected_pieces, neighbours4},
+    watershed::distance_transform,
+};
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 const CORE_DEPTH: f32 = 3.0;

@@ -40,6 +40,8 @@ struct Sample {
     colour: [f64; 3],
 }
 
+/// Colours that k-means begins with.
+const GUESSES: usize = 8;
 /// Pixels in the sample, at least, where the photo has as many.
 const SAMPLE: usize = 16_000;
 /// Distance beyond which a pixel does not count as binder while fitting.
@@ -52,7 +54,7 @@ const WIDE: f64 = 3.0 / 255.0;
 const FIRST_DEVIATION: f64 = 8.0 / 255.0;
 
 impl BinderModel {
-    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken. `colour`, sRGB / 255, makes it the only guess.
+    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken.
     ///
     /// # Complexity
     ///
@@ -69,18 +71,15 @@ impl BinderModel {
     ///     image::Rgb([level; 3])
     /// });
     /// let picture = encoded_image(&photo);
-    /// let binder = BinderModel::fit(&picture, None, 0);
+    /// let binder = BinderModel::fit(&picture, 0);
     /// let distance = binder.distance(&picture);
     /// assert!(distance[[25, 25]] > 20.0 && distance[[50, 5]] < 4.0 && distance[[50, 60]] < 4.0);
     /// ```
     #[must_use]
-    pub fn fit(picture: &Array2<[f32; 3]>, colour: Option<[f32; 3]>, seed: u64) -> Self {
+    pub fn fit(picture: &Array2<[f32; 3]>, seed: u64) -> Self {
         let samples = sample(picture);
         let colours: Vec<[f64; 3]> = samples.iter().map(|s| s.colour).collect();
-        let guesses = match colour {
-            Some(c) => vec![c.map(f64::from)],
-            None => kmeans(&colours, 8, seed).centres,
-        };
+        let guesses = kmeans(&colours, GUESSES, seed).centres;
         let fits: Vec<(f64, Self)> = guesses
             .par_iter()
             .map(|guess| {
@@ -102,6 +101,37 @@ impl BinderModel {
             }
         }
         best
+    }
+
+    /// Fits light and scatter to pixels near a given colour, sRGB / 255, and no further: for a binder that is known, or whose colours go over into those of the particles without a gap, where
+    /// [`fit`](Self::fit) would spread over both.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{BinderModel, encoded_image};
+    ///
+    /// // Grey of every level, but most pixels near 100.
+    /// let photo = image::RgbImage::from_fn(100, 100, |x, y| {
+    ///     let n = (x * 7919 ^ y * 104_729) % 199;
+    ///     image::Rgb([if n < 99 { 96 + (n % 9) as u8 } else { n as u8 }; 3])
+    /// });
+    /// let binder = BinderModel::fit_near(&encoded_image(&photo), [0.4; 3]);
+    /// assert!((binder.light(50, 50)[0] * 255.0 - 100.0).abs() < 5.0 && binder.spread() < 8.0 / 255.0);
+    /// ```
+    #[must_use]
+    pub fn fit_near(picture: &Array2<[f32; 3]>, colour: [f32; 3]) -> Self {
+        let samples = sample(picture);
+        let mut model = Self::flat(colour.map(f64::from), FIRST_DEVIATION, picture.dim());
+        let fixed = model.whitening;
+        for terms in [1, 3, 3, TERMS, TERMS, TERMS] {
+            model.whitening = fixed;
+            // The given colour is near the middle of the photo's: it may shift by what light does, not to another heap.
+            if !model.fit_round(&samples, 2.0, terms) {
+                break;
+            }
+        }
+        model
     }
 
     /// For a photo of two tones, such as a tomogram or a thin section, where neither is narrow enough for [`fit`](Self::fit): k-means finds the tones, and the binder is the one in thinner threads. Halfway between
@@ -154,7 +184,7 @@ impl BinderModel {
     ///
     /// let photo = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([90 + ((x * 7919 ^ y * 104_729) % 21) as u8; 3]));
     /// let picture = encoded_image(&photo);
-    /// let binder = BinderModel::fit(&picture, None, 0);
+    /// let binder = BinderModel::fit(&picture, 0);
     /// assert!(binder.refit(&smooth(&picture, 2.0)).spread() < 0.5 * binder.spread());
     /// ```
     #[must_use]
@@ -331,6 +361,38 @@ impl BinderModel {
             .map(|w| (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]).powi(2))
             .sum()
     }
+}
+
+/// The photo's eight main colours by k-means, sRGB / 255, and the share of pixels nearest to each, most first: to choose the binder from. Fewer if there are fewer.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_segment::{encoded_image, main_colours};
+///
+/// let photo = image::RgbImage::from_fn(40, 40, |x, _| image::Rgb([if x < 30 { 200 } else { 50 }; 3]));
+/// let colours = main_colours(&encoded_image(&photo), 0);
+/// assert_eq!((colours.len(), colours[0].1), (2, 0.75));
+/// ```
+#[must_use]
+pub fn main_colours(picture: &Array2<[f32; 3]>, seed: u64) -> Vec<([f32; 3], f64)> {
+    let colours: Vec<[f64; 3]> = sample(picture).iter().map(|s| s.colour).collect();
+    let groups = kmeans(&colours, GUESSES, seed);
+    let share = |g: usize| groups.assignment.iter().filter(|a| **a == g).count() as f64 / colours.len() as f64;
+    let main = groups.centres.iter().enumerate();
+    main.map(|(g, centre)| (centre.map(|c| c as f32), share(g))).collect()
+}
+
+/// Colour of the densest spot of a picture's colours: the middle of the fullest cube of eight levels' side.
+pub(crate) fn densest(picture: &Array2<[f32; 3]>) -> [f32; 3] {
+    let mut counts = vec![0_u32; 32 * 32 * 32];
+    let level = |v: f32| ((v * 32.0) as usize).min(31);
+    for s in sample(picture) {
+        let [r, g, b] = s.colour.map(|c| level(c as f32));
+        counts[(r * 32 + g) * 32 + b] += 1;
+    }
+    let fullest = (0..counts.len()).max_by_key(|&i| (counts[i], std::cmp::Reverse(i))).unwrap_or(0);
+    [fullest / 1024, fullest / 32 % 32, fullest % 32].map(|l| (l as f32 + 0.5) / 32.0)
 }
 
 /// Mean distance of a mask's pixels to its outline: threads are shallow, particles deep.

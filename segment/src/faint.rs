@@ -41,7 +41,7 @@ const LEAST: usize = 60;
 ///     image::Rgb([(if inside { 116 } else { 100 }) + texture as u8; 3])
 /// });
 /// let picture = encoded_image(&photo);
-/// let binder = BinderModel::fit(&picture, None, 0);
+/// let binder = BinderModel::fit(&picture, 0);
 /// assert!(binder.distance(&picture)[[60, 60]] < 5.0);
 /// let distance = faint_regions(&picture, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0]);
 /// let found = distance.iter().filter(|z| **z > 0.0).count();

@@ -71,7 +71,7 @@ mod segmentation;
 mod split;
 mod watershed;
 
-pub use binder::BinderModel;
+pub use binder::{BinderModel, main_colours};
 pub use category::{Category, categorise};
 pub use error::SegmentError;
 pub use faint::faint_regions;

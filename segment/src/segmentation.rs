@@ -6,7 +6,7 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    binder::{BinderModel, length, mean_depth},
+    binder::{BinderModel, densest, length, mean_depth},
     category::{Category, categorise},
     error::SegmentError,
     faint::faint_regions,
@@ -94,12 +94,16 @@ pub fn segment(
     report(0.0)?;
     let colours = smooth(&encoded_image(photo), options.smoothing);
     report(0.15)?;
-    let binder = BinderModel::fit(&colours, options.binder.map(|c| c.map(|v| v as f32)), options.seed);
+    let given = options.binder.map(|c| c.map(|v| v as f32));
+    let mut binder = match given {
+        Some(colour) => BinderModel::fit_near(&colours, colour),
+        None => BinderModel::fit(&colours, options.seed),
+    };
     report(0.3)?;
     let mut deviation = binder.deviation(&colours);
     let mut distance = deviation.mapv(length);
     deviation = binder.blunted(HUE_SCATTER).deviation(&colours);
-    let [low, mut high] = options.thresholds;
+    let [mut low, mut high] = options.thresholds;
     let mut rounds = ROUNDS;
     // Holes in a whole region may be binder between particles that touch: only small ones are filled before it is cut.
     let mut hole_share = HOLE_SHARE;
@@ -113,6 +117,13 @@ pub fn segment(
             deviation = tones.deviation(&binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing)));
             distance = deviation.mapv(length);
             (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, tones.share(), true);
+            find_faint = false;
+        } else {
+            // No heap of colours stands apart: what lies near the densest spot is the best that can be called binder.
+            binder = BinderModel::fit_near(&colours, densest(&colours));
+            distance = binder.distance(&colours);
+            deviation = binder.blunted(HUE_SCATTER).deviation(&colours);
+            (low, high) = (NEAR * low, NEAR * high);
             find_faint = false;
         }
     }
@@ -351,6 +362,8 @@ impl Segmentation {
 
 /// Change of the number of regions, percent of the profiles, that is worth a warning.
 const UNSTABLE: f64 = 25.0;
+/// Thresholds over the usual ones where no binder stands apart.
+const NEAR: f32 = 0.5;
 /// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
 const FAINT: f32 = 0.7;
 /// Least scatter, sRGB / 255, while outlines are drawn: four levels.

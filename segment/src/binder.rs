@@ -40,6 +40,8 @@ struct Sample {
     colour: [f64; 3],
 }
 
+/// Distance z of the tones of [`BinderModel::fit_two_tones`].
+pub(crate) const TONE_DISTANCE: f32 = 9.0;
 /// Colours that k-means begins with.
 const GUESSES: usize = 8;
 /// Pixels in the sample, at least, where the photo has as many.
@@ -135,7 +137,7 @@ impl BinderModel {
     }
 
     /// For a photo of two tones, such as a tomogram or a thin section, where neither is narrow enough for [`fit`](Self::fit): k-means finds the tones, and the binder is the one in thinner threads. Halfway between
-    /// them lies at z = 4.5. The second value is the distance of the tones over the sum of their scatters; below about 2 they are not two.
+    /// them lies at z = 4.5, half of what separates them. The second value is the distance of the tones over the sum of their scatters; below about 2 they are not two.
     ///
     /// # Examples
     ///
@@ -170,7 +172,7 @@ impl BinderModel {
             (b, 1)
         };
         let spread = (tones.inertia / samples.len() as f64).sqrt();
-        let mut model = Self::flat(thin, step / 9.0, picture.dim());
+        let mut model = Self::flat(thin, step / f64::from(TONE_DISTANCE), picture.dim());
         model.share = tones.assignment.iter().filter(|g| **g == group).count() as f64 / samples.len() as f64;
         (model, step / (2.0 * spread))
     }
@@ -391,7 +393,9 @@ pub(crate) fn densest(picture: &Array2<[f32; 3]>) -> [f32; 3] {
         let [r, g, b] = s.colour.map(|c| level(c as f32));
         counts[(r * 32 + g) * 32 + b] += 1;
     }
-    let fullest = (0..counts.len()).max_by_key(|&i| (counts[i], std::cmp::Reverse(i))).unwrap_or(0);
+    let fullest = (0..counts.len())
+        .max_by_key(|&i| (counts[i], std::cmp::Reverse(i)))
+        .unwrap_or(0);
     [fullest / 1024, fullest / 32 % 32, fullest % 32].map(|l| (l as f32 + 0.5) / 32.0)
 }
 

@@ -6,7 +6,7 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    binder::{BinderModel, densest, length, mean_depth},
+    binder::{BinderModel, TONE_DISTANCE, densest, length, mean_depth},
     category::{Category, categorise},
     error::SegmentError,
     faint::faint_regions,
@@ -110,21 +110,28 @@ pub fn segment(
     let mut share = binder.share();
     let connected = options.binder.is_some() || surrounds(&distance.mapv(|z| z < low));
     let mut clear = connected && stands_out(&distance, low, high);
-    let mut find_faint = true;
+    let (mut find_faint, mut vague) = (true, false);
     if !clear && options.binder.is_none() {
-        let (tones, apart) = BinderModel::fit_two_tones(&binder.even_light(&colours), options.seed);
-        if apart > if connected { TWO_TONES } else { TWO_TONES_IN_PIECES } {
-            deviation = tones.deviation(&binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing)));
-            distance = deviation.mapv(length);
+        let even = binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing));
+        let (tones, apart) = BinderModel::fit_two_tones(&even, options.seed);
+        let candidates = tones.deviation(&even);
+        if apart > TWO_TONES && edge_slope(&candidates.mapv(length)) > TONE_EDGE {
+            (deviation, distance) = (candidates.clone(), candidates.mapv(length));
             (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, tones.share(), true);
             find_faint = false;
         } else {
-            // No heap of colours stands apart: what lies near the densest spot is the best that can be called binder.
-            binder = BinderModel::fit_near(&colours, densest(&colours));
-            distance = binder.distance(&colours);
-            deviation = binder.blunted(HUE_SCATTER).deviation(&colours);
-            (low, high) = (NEAR * low, NEAR * high);
-            find_faint = false;
+            // No heap of colours stands apart: what lies near the densest spot may still be a binder.
+            let near = BinderModel::fit_near(&colours, densest(&colours));
+            let nearness = near.distance(&colours);
+            let thresholds = [NEAR * low, NEAR * high];
+            if near.share() > LEAST_SHARE
+                && surrounds(&nearness.mapv(|z| z < thresholds[0]))
+                && stands_out(&nearness, thresholds[0], thresholds[1])
+            {
+                deviation = near.blunted(HUE_SCATTER).deviation(&colours);
+                ([low, high], share, clear, vague) = (thresholds, near.share(), true, true);
+                (binder, distance, find_faint) = (near, nearness, false);
+            }
         }
     }
     let mut mask = hysteresis(&distance, low, high);
@@ -165,6 +172,9 @@ pub fn segment(
     }
     out.renumber();
     out.judge_binder(share, clear);
+    if vague {
+        out.findings.push(Finding::new("vague-binder", "the binder's colours go over into those of particles: what differs clearly from the commonest colour is outlined, and particles of the binder's own colours are missed; look at the overlay, give the binder's colour, or import a label map".into()));
+    }
     out.judge_count(&distance, [low, high], options.min_area);
     report(1.0)?;
     Ok(out)
@@ -342,7 +352,7 @@ impl Segmentation {
 
     fn judge_binder(&mut self, share: f64, clear: bool) {
         let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
-        if share < 0.2 {
+        if share < LEAST_SHARE {
             let share = 100.0 * share;
             self.findings.push(Finding::new(
                 "no-binder",
@@ -362,6 +372,8 @@ impl Segmentation {
 
 /// Change of the number of regions, percent of the profiles, that is worth a warning.
 const UNSTABLE: f64 = 25.0;
+/// Share of the photo that a binder covers at least.
+const LEAST_SHARE: f64 = 0.2;
 /// Thresholds over the usual ones where no binder stands apart.
 const NEAR: f32 = 0.5;
 /// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
@@ -376,11 +388,35 @@ const SHARP: f32 = 0.8;
 const ROUNDS: usize = 3;
 /// Holes of less than a twentieth of their region's area are filled before it is cut.
 const HOLE_SHARE: Option<usize> = Some(20);
-/// Distance of two tones over the sum of their scatters from which they are two.
-const TWO_TONES: f64 = 1.69;
+/// Distance of two tones over the sum of their scatters from which they are two: 1.48 was seen in gravel, 1.62 to 1.85 in tomograms and thin sections.
+const TWO_TONES: f64 = 1.55;
+/// Slope of the borders between two tones, a pixel's share of their distance, from which they are edges: 0.15 was seen in shaded pebbles, 0.33 to 0.47 in tomograms and thin sections.
+const TONE_EDGE: f32 = 0.25;
 
-/// The same where the likeliest binder is in pieces, which says that it is the particles.
-const TWO_TONES_IN_PIECES: f64 = 1.55;
+/// Median slope, across the border between two tones at half their distance, of the distance to one of them, as a share of their distance a pixel. 0 if there is no border.
+fn edge_slope(distance: &Array2<f32>) -> f32 {
+    let (height, width) = distance.dim();
+    let half = 0.5 * TONE_DISTANCE;
+    let mut slopes = Vec::new();
+    for y in 1..height - 1 {
+        for x in 1..width - 1 {
+            let beyond = distance[[y, x]] >= half;
+            if beyond != (distance[[y, x + 1]] >= half) || beyond != (distance[[y + 1, x]] >= half) {
+                let across = |j: usize| distance[[j, x + 1]] - distance[[j, x - 1]];
+                let down = |i: usize| distance[[y + 1, i]] - distance[[y - 1, i]];
+                // Sobel's means of three rows and columns.
+                let dx = across(y - 1) + 2.0 * across(y) + across(y + 1);
+                let dy = down(x - 1) + 2.0 * down(x) + down(x + 1);
+                slopes.push(dx.hypot(dy) / (8.0 * TONE_DISTANCE));
+            }
+        }
+    }
+    let middle = slopes.len() / 2;
+    if slopes.is_empty() {
+        return 0.0;
+    }
+    *slopes.select_nth_unstable_by(middle, f32::total_cmp).1
+}
 
 /// Whether a mask can be the binder: its largest piece holds at least a third of it; and where the rest hangs together too, the mask is the one in thinner threads.
 fn surrounds(mask: &Array2<bool>) -> bool {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 
 use crate::{
     regions::{connected_pieces, neighbours4},
@@ -11,6 +11,8 @@ use crate::{
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 const CORE_DEPTH: f32 = 3.0;
+/// The same for small regions, as a share of the greatest depth within three pixels.
+const CORE_SHARE: f32 = 0.9;
 /// Pixels that an outline may move out in one call.
 const REACH: u8 = 2;
 /// 1 / (2 √(2π)): what a unit of curvature times blur takes from half the contrast.
@@ -24,27 +26,47 @@ const MOST_CURVED: f32 = 0.12;
 /// pixels out of the mask, get `None`.
 #[must_use]
 pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<[f32; 3]>> {
+    cores(deviation, mask, reach).mapv(|core| core.map(|(colour, _)| colour))
+}
+
+/// [`core_colours`], with the greatest depth in the core's piece of the mask.
+fn cores(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<([f32; 3], f32)>> {
     let dim = mask.dim();
     let depth = distance_transform(mask);
-    let around = widest(&depth, 3);
-    let core = Array2::from_shape_fn(dim, |p| mask[p] && depth[p] >= CORE_DEPTH.min(0.9 * around[p]));
+    let (pieces, count) = connected_pieces(mask, |m| m);
+    let mut largest = vec![0.0_f32; count as usize + 1];
+    for (&piece, &d) in pieces.iter().zip(&depth) {
+        let l = &mut largest[piece as usize];
+        *l = l.max(d);
+    }
+    let square = |[y, x]: [usize; 2], radius: usize| {
+        let columns = x.saturating_sub(radius)..(x + radius + 1).min(dim.1);
+        (y.saturating_sub(radius)..(y + radius + 1).min(dim.0)).flat_map(move |j| columns.clone().map(move |i| [j, i]))
+    };
+    let mut core = Array2::from_elem(dim, false);
+    let mut places = Vec::new();
+    for ((y, x), &d) in depth.indexed_iter() {
+        let deepest_around = || square([y, x], 3).map(|q| depth[q]).fold(0.0, f32::max);
+        if mask[[y, x]] && (d >= CORE_DEPTH || d >= CORE_SHARE * deepest_around()) {
+            core[[y, x]] = true;
+            places.push([y, x]);
+        }
+    }
     let mut out = Array2::from_elem(dim, None);
     let mut queue = VecDeque::new();
-    for ((y, x), _) in core.indexed_iter().filter(|(_, c)| **c) {
-        let (rows, columns) = (
-            y.saturating_sub(2)..(y + 3).min(dim.0),
-            x.saturating_sub(2)..(x + 3).min(dim.1),
-        );
+    for p in places {
         let mut sum = [0.0_f32; 4];
-        for q in rows.flat_map(|j| columns.clone().map(move |i| (j, i))) {
-            if core[q] {
-                let d = deviation[q];
-                (0..3).for_each(|c| sum[c] += d[c]);
-                sum[3] += 1.0;
-            }
+        for q in square(p, 2).filter(|q| core[*q]) {
+            let d = deviation[q];
+            (0..3).for_each(|c| sum[c] += d[c]);
+            sum[3] += 1.0;
         }
-        out[[y, x]] = Some([sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]);
-        queue.push_back(([y, x], 0_u8));
+        let colour = [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]];
+        out[p] = Some((colour, largest[pieces[p] as usize]));
+        // Only cores at the border of their region have anything to pass on.
+        if neighbours4(p, dim).any(|q| !core[q]) {
+            queue.push_back((p, 0_u8));
+        }
     }
     while let Some((p, outside)) = queue.pop_front() {
         let colour = out[p];
@@ -86,45 +108,18 @@ pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8
 /// ```
 #[must_use]
 pub fn half_contrast(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, blur: f32) -> Array2<bool> {
-    let cores = core_colours(deviation, mask, REACH);
-    let radius = widest(&largest_depth(mask), usize::from(REACH));
-    Array2::from_shape_fn(mask.dim(), |p| {
-        cores[p].is_some_and(|c| {
-            let d = deviation[p];
+    let mut out = Array2::from_elem(mask.dim(), false);
+    Zip::from(&mut out)
+        .and(&cores(deviation, mask, REACH))
+        .and(deviation)
+        .for_each(|keep, core, d| {
+            let Some((c, radius)) = core else { return };
             let (along, step) = (
                 d[0] * c[0] + d[1] * c[1] + d[2] * c[2],
                 c[0] * c[0] + c[1] * c[1] + c[2] * c[2],
             );
-            let curvature = HALF_EDGE * blur / radius[p].max(1.0);
-            along >= (0.5 - curvature.min(MOST_CURVED)) * step
-        })
-    })
-}
-
-/// Greatest distance to the outside in the piece of a mask that each pixel belongs to, 0 outside.
-fn largest_depth(mask: &Array2<bool>) -> Array2<f32> {
-    let depth = distance_transform(mask);
-    let (pieces, count) = connected_pieces(mask, |m| m);
-    let mut largest = vec![0.0_f32; count as usize + 1];
-    for (&piece, &d) in pieces.iter().zip(&depth) {
-        let l = &mut largest[piece as usize];
-        *l = l.max(d);
-    }
-    largest[0] = 0.0;
-    pieces.mapv(|p| largest[p as usize])
-}
-
-/// Largest value of a field in the square of `radius` around each pixel.
-fn widest(field: &Array2<f32>, radius: usize) -> Array2<f32> {
-    let (height, width) = field.dim();
-    let across = Array2::from_shape_fn((height, width), |(y, x)| {
-        (x.saturating_sub(radius)..(x + radius + 1).min(width))
-            .map(|i| field[[y, i]])
-            .fold(0.0, f32::max)
-    });
-    Array2::from_shape_fn((height, width), |(y, x)| {
-        (y.saturating_sub(radius)..(y + radius + 1).min(height))
-            .map(|j| across[[j, x]])
-            .fold(0.0, f32::max)
-    })
+            let curvature = HALF_EDGE * blur / radius.max(1.0);
+            *keep = along >= (0.5 - curvature.min(MOST_CURVED)) * step;
+        });
+    out
 }

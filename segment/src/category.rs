@@ -1,8 +1,12 @@
 //! Colour categories of profiles.
 
+use rand::{RngExt, SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
 use crate::{
     kmeans::{Clusters, kmeans, silhouette},
     lab::lab,
+    options::CategoryCount,
     profile::Profile,
 };
 
@@ -22,20 +26,39 @@ const GROUPED: f64 = 0.5;
 /// Most categories looked for.
 const MOST: usize = 8;
 
-/// Groups profiles by mean colour, in Lab: k-means for a number given, else for the number from 2 to 8 with the best silhouette, or one if the best is below 0.5. Sets [`Profile::category`] and returns the
-/// categories, most profiles first.
+/// Groups profiles by mean colour, in Lab, where distances are those the eye sees: k-means, as in the paper, for a number given or chosen. Sets [`Profile::category`] and returns the categories, most
+/// profiles first.
 ///
 /// # Complexity
 ///
 /// Profiles × categories × rounds.
-pub fn categorise(profiles: &mut [Profile], count: Option<usize>, seed: u64) -> Vec<Category> {
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, section 5.2.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_segment::{CategoryCount, SegmentOptions, Segmentation, categorise};
+///
+/// let photo = image::RgbImage::from_fn(60, 20, |x, _| image::Rgb([if x < 30 { 30 } else { 220 }; 3]));
+/// let labels = ndarray::Array2::from_shape_fn((20, 60), |(y, x)| if x % 10 > 5 && y > 5 { 1 + x as u32 / 10 } else { 0 });
+/// let mut profiles = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?.profiles;
+/// let categories = categorise(&mut profiles, CategoryCount::Given(2), 0);
+/// assert_eq!([categories[0].profiles, categories[1].profiles], [3, 3]);
+/// assert_ne!(profiles[0].category, profiles[5].category);
+/// # Ok::<(), stereology_segment::SegmentError>(())
+/// ```
+pub fn categorise(profiles: &mut [Profile], count: CategoryCount, seed: u64) -> Vec<Category> {
     let colours: Vec<[f64; 3]> = profiles
         .iter()
         .map(|p| lab(p.colour.map(|c| c as f32)).map(f64::from))
         .collect();
     let clusters = match count {
-        Some(k) => kmeans(&colours, k.min(255), seed),
-        None => best_by_silhouette(&colours, seed),
+        CategoryCount::Given(k) => kmeans(&colours, k.min(255), seed),
+        CategoryCount::Silhouette => best_by_silhouette(&colours, seed),
+        CategoryCount::Gap => kmeans(&colours, best_by_gap(&colours, seed), seed),
     };
     let mut sums = vec![([0.0; 3], 0.0, 0_usize); clusters.centres.len()];
     for (p, &group) in profiles.iter_mut().zip(&clusters.assignment) {
@@ -64,4 +87,131 @@ fn best_by_silhouette(colours: &[[f64; 3]], seed: u64) -> Clusters {
         }
     }
     best.1
+}
+
+/// Sets of unstructured colours to compare with.
+const REFERENCES: u64 = 10;
+/// Colours looked at by the gap statistic, at most.
+const GAP_SAMPLE: usize = 400;
+
+/// Number of groups by the gap statistic: how much tighter k groups of the colours are than k groups of as many colours spread evenly over their box.
+fn best_by_gap(colours: &[[f64; 3]], seed: u64) -> usize {
+    let step = colours.len().div_ceil(GAP_SAMPLE).max(1);
+    let points: Vec<[f64; 3]> = colours.iter().copied().step_by(step).collect();
+    let bounds = points
+        .iter()
+        .fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
+            [
+                std::array::from_fn(|c| low[c].min(p[c])),
+                std::array::from_fn(|c| high[c].max(p[c])),
+            ]
+        });
+    let references: Vec<Vec<[f64; 3]>> = (0..REFERENCES)
+        .map(|stream| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(1000 + stream);
+            let [low, high] = bounds;
+            let draw = |_: &[f64; 3]| std::array::from_fn(|c| low[c] + (high[c] - low[c]) * rng.random::<f64>());
+            points.iter().map(draw).collect()
+        })
+        .collect();
+    let spread = |points: &[[f64; 3]], k: usize| kmeans(points, k, seed).inertia.max(1e-12).ln();
+    let gap = |k: usize| {
+        let logs: Vec<f64> = references.iter().map(|r| spread(r, k)).collect();
+        let n = logs.len() as f64;
+        let mean = logs.iter().sum::<f64>() / n;
+        let variance = logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n;
+        (mean - spread(&points, k), (variance * (1.0 + 1.0 / n)).sqrt())
+    };
+    let mut here = gap(1);
+    for k in 1..MOST.min(points.len().max(1)) {
+        let next = gap(k + 1);
+        if here.0 >= next.0 - next.1 {
+            return k;
+        }
+        here = next;
+    }
+    MOST.min(points.len().max(1))
+}
+
+/// Kruskal and Wallis's test that profiles of all categories have the same distribution of sizes. A small p value says that size and colour go together, so that categories should be unfolded apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeByCategory {
+    /// H, which grows with the differences of mean rank.
+    pub statistic: f64,
+    /// Share of 1,999 random exchanges of categories, and the one seen, with an H at least as large.
+    pub p_value: f64,
+}
+
+/// Random exchanges of categories.
+const EXCHANGES: u32 = 1999;
+
+/// Tests whether size and colour category go together, over whole profiles; `None` if these are of fewer than two categories.
+///
+/// # Formula
+///
+/// ```text
+/// H = 12 / (n (n + 1)) Σ n_k (R̄_k − (n + 1) / 2)²        R̄_k mean rank of the sizes in category k
+/// ```
+///
+/// # References
+///
+/// Kruskal & Wallis 1952; the p value by exchange of labels, the same for the same seed.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_segment::{SegmentOptions, Segmentation};
+///
+/// // Small dark squares, large pale ones.
+/// let photo = image::RgbImage::from_fn(320, 40, |x, _| image::Rgb([if x / 20 % 2 == 0 { 30 } else { 220 }; 3]));
+/// let labels = ndarray::Array2::from_shape_fn((40, 320), |(y, x)| {
+///     let side = if x / 20 % 2 == 0 { 6 } else { 10 + x / 40 };
+///     if x % 20 < side && (2..2 + side).contains(&y) && x % 20 > 0 { 1 + x as u32 / 20 } else { 0 }
+/// });
+/// let found = Segmentation::from_labels(&photo, labels, &SegmentOptions::default().with_categories(2))?;
+/// assert!(found.size_by_category.is_some_and(|test| test.p_value < 0.01));
+/// # Ok::<(), stereology_segment::SegmentError>(())
+/// ```
+#[must_use]
+pub fn size_by_category(profiles: &[Profile], seed: u64) -> Option<SizeByCategory> {
+    let whole: Vec<&Profile> = profiles.iter().filter(|p| !p.touches_edge).collect();
+    let n = whole.len() as f64;
+    let mut categories: Vec<usize> = whole.iter().map(|p| usize::from(p.category)).collect();
+    let most = categories.iter().copied().max()?;
+    if categories.iter().all(|c| *c == most) {
+        return None;
+    }
+    let mut order: Vec<usize> = (0..whole.len()).collect();
+    order.sort_by(|&a, &b| whole[a].size.total_cmp(&whole[b].size));
+    let mut ranks = vec![0.0; whole.len()];
+    let same = |a: &usize, b: &usize| whole[*a].size.total_cmp(&whole[*b].size).is_eq();
+    let mut before = 0;
+    for tied in order.chunk_by(same) {
+        let rank = before as f64 + 0.5 * (tied.len() + 1) as f64;
+        tied.iter().for_each(|&i| ranks[i] = rank);
+        before += tied.len();
+    }
+    let h = |categories: &[usize]| {
+        let mut sums = vec![(0.0, 0.0); most + 1];
+        for (&category, rank) in categories.iter().zip(&ranks) {
+            sums[category].0 += rank;
+            sums[category].1 += 1.0;
+        }
+        let filled = sums.iter().filter(|s| s.1 > 0.0);
+        12.0 / (n * (n + 1.0))
+            * filled
+                .map(|(sum, count)| count * (sum / count - 0.5 * (n + 1.0)).powi(2))
+                .sum::<f64>()
+    };
+    let statistic = h(&categories);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let as_large = (0..EXCHANGES).filter(|_| {
+        categories.shuffle(&mut rng);
+        h(&categories) >= statistic - 1e-9
+    });
+    Some(SizeByCategory {
+        statistic,
+        p_value: (1 + as_large.count()) as f64 / f64::from(1 + EXCHANGES),
+    })
 }

@@ -36,6 +36,20 @@ pub enum SegmentError {
         /// Rows.
         height: u32,
     },
+    /// More pixels than are allowed.
+    #[error(
+        "the photo is {width} x {height} pixels, more than {most}; it would take about {gigabytes} gigabytes of memory: allow more pixels, or cut or shrink the photo"
+    )]
+    TooLarge {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Pixels allowed.
+        most: u64,
+        /// Memory that segmenting it would take.
+        gigabytes: f64,
+    },
     /// Every pixel has the same colour.
     #[error(
         "the photo has a single colour, {colour:?}; there is nothing to separate: check that the right file was exported"
@@ -68,11 +82,13 @@ pub enum SegmentError {
     NoLabels,
     /// The label map holds classes, not profiles.
     #[error(
-        "the label map holds only the values 0, 1, 2 in {pieces} pieces: a mask of three classes (binder, inside, edge), not a number for each profile; export the label image instead (segmenteverygrain: \
-         the GeoJSON or the instance labels; ImageJ: Analyze Particles, Count Masks)"
+        "the label map holds only the values {values} beside 0, in {pieces} pieces: a mask of classes (binder and particle; or binder, inside, edge), not a number for each profile; export the label image \
+         instead (segmenteverygrain: the GeoJSON or the instance labels; ImageJ: Analyze Particles, Count Masks; scikit-image: measure.label)"
     )]
     ClassMask {
-        /// Connected pieces of the values 1 and 2.
+        /// The values.
+        values: String,
+        /// Connected pieces of them.
         pieces: usize,
     },
     /// The label file cannot be read as labels, or written.

@@ -3,7 +3,8 @@
 /// A remark on a segmentation; `code` is fixed, `message` says what was measured and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// `no-binder`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`, `clipped-labels`, `split-label`, `small-labels`.
+    /// Of the photo: `alpha-over-white`, `no-binder`, `vague-binder`, `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`. Of a label map: `clipped-labels`, `split-label`,
+    /// `small-labels`, `first-page`, `overlapping-labels`, `lost-labels`.
     pub code: &'static str,
     /// For people.
     pub message: String,

@@ -24,22 +24,50 @@ pub enum EdgeRule {
     All,
 }
 
+/// Where the binder's colour comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum BinderChoice {
+    /// Found in the photo.
+    #[default]
+    Found,
+    /// Given, sRGB / 255.
+    Colour([f64; 3]),
+    /// One of the photo's [`main_colours`](crate::main_colours), numbered from 0.
+    MainColour(usize),
+}
+
+/// How many colour categories.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CategoryCount {
+    /// The number from 2 to 8 with the best mean silhouette, one if that is below 0.5 (Rousseeuw 1987).
+    #[default]
+    Silhouette,
+    /// The first number from 1 to 8 whose gap to unstructured colours is not exceeded by the next one's by more than its standard error (Tibshirani, Walther & Hastie 2001).
+    Gap,
+    /// Given, 1 to 255.
+    Given(usize),
+}
+
 /// How to segment. `Default` is what a photo of a cut stone needs.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SegmentOptions {
-    /// Colour of the binder, sRGB / 255; found when `None`.
-    pub binder: Option<[f64; 3]>,
+    /// Where the binder's colour comes from.
+    pub binder: BinderChoice,
     /// Least area of a profile in pixels; smaller ones are dropped, and unfolding is told so by [`crate::Segmentation::min_size`].
     pub min_area: usize,
-    /// Number of colour categories; by silhouette when `None`.
-    pub categories: Option<usize>,
+    /// Number of colour categories.
+    pub categories: CategoryCount,
     /// Holes in profiles.
     pub holes: Holes,
     /// Edge rule.
     pub edge_rule: EdgeRule,
     /// Distances to the binder, in its standard deviations, at which a region ends and which it must reach.
     pub thresholds: [f32; 2],
+    /// Height that parts of a region must stand above their neck to be particles of their own: pixels, and share of the lower part's depth; the larger counts. The h of h-maxima.
+    pub rise: [f32; 2],
     /// Standard deviation of the smoothing before anything else, pixels.
     pub smoothing: f32,
     /// Seed of every random choice.
@@ -49,12 +77,13 @@ pub struct SegmentOptions {
 impl Default for SegmentOptions {
     fn default() -> Self {
         Self {
-            binder: None,
+            binder: BinderChoice::Found,
             min_area: 20,
-            categories: None,
+            categories: CategoryCount::Silhouette,
             holes: Holes::Fill,
             edge_rule: EdgeRule::Frame,
             thresholds: [5.0, 9.0],
+            rise: [0.7, 0.1],
             smoothing: 1.0,
             seed: 0,
         }
@@ -65,7 +94,7 @@ impl SegmentOptions {
     /// The binder's colour, sRGB / 255.
     #[must_use]
     pub const fn with_binder(mut self, colour: [f64; 3]) -> Self {
-        self.binder = Some(colour);
+        self.binder = BinderChoice::Colour(colour);
         self
     }
 
@@ -76,10 +105,31 @@ impl SegmentOptions {
         self
     }
 
+    /// The binder is the photo's main colour of this number, from 0.
+    #[must_use]
+    pub const fn with_main_colour(mut self, number: usize) -> Self {
+        self.binder = BinderChoice::MainColour(number);
+        self
+    }
+
+    /// Number of colour categories by the gap statistic.
+    #[must_use]
+    pub const fn with_gap(mut self) -> Self {
+        self.categories = CategoryCount::Gap;
+        self
+    }
+
+    /// Height of parts above their necks: pixels, and share of their depth.
+    #[must_use]
+    pub const fn with_rise(mut self, pixels: f32, share: f32) -> Self {
+        self.rise = [pixels, share];
+        self
+    }
+
     /// Number of colour categories.
     #[must_use]
     pub const fn with_categories(mut self, count: usize) -> Self {
-        self.categories = Some(count);
+        self.categories = CategoryCount::Given(count);
         self
     }
 
@@ -127,15 +177,18 @@ impl SegmentOptions {
                 requirement,
             })
         };
-        if let Some(&c) = self.binder.iter().flatten().find(|c| !(0.0..=1.0).contains(*c)) {
+        if let BinderChoice::Colour(colour) = self.binder
+            && let Some(&c) = colour.iter().find(|c| !(0.0..=1.0).contains(*c))
+        {
             return refuse("binder", c, "a colour is three numbers from 0 to 1 (sRGB / 255)");
         }
-        if self.categories.is_some_and(|k| k == 0 || k > 255) {
-            return refuse(
-                "categories",
-                self.categories.unwrap_or(0) as f64,
-                "must be from 1 to 255",
-            );
+        if let CategoryCount::Given(k) = self.categories
+            && !(1..=255).contains(&k)
+        {
+            return refuse("categories", k as f64, "must be from 1 to 255");
+        }
+        if let Some(&r) = self.rise.iter().find(|r| !(r.is_finite() && **r >= 0.0)) {
+            return refuse("rise", f64::from(r), "must be zero or more");
         }
         let [low, high] = self.thresholds;
         if !(low > 0.0 && low <= high && high.is_finite()) {

@@ -4,7 +4,16 @@ use std::{io::Cursor, path::Path};
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 
-use crate::error::SegmentError;
+use crate::{error::SegmentError, finding::Finding};
+
+/// A photograph from a file, and what to know about how it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotoFile {
+    /// 8-bit sRGB, up is up.
+    pub photo: RgbImage,
+    /// `alpha-over-white`.
+    pub findings: Vec<Finding>,
+}
 
 /// Reads a PNG, JPEG or TIFF photograph as 8-bit sRGB: 16-bit samples are rounded, grey becomes three equal channels, palettes are looked up, transparency is laid over white, and the camera's EXIF
 /// orientation is applied, so that up is up.
@@ -23,13 +32,34 @@ use crate::error::SegmentError;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_photo(path: impl AsRef<Path>) -> Result<RgbImage, SegmentError> {
+    Ok(read_photo_up_to(path, u64::MAX)?.photo)
+}
+
+/// [`read_photo`], refused before it is decoded if it has more than `most` pixels, with what was noticed.
+///
+/// # Errors
+///
+/// As [`read_photo`], and [`SegmentError::TooLarge`].
+///
+/// # Examples
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("photo.png");
+/// image::RgbaImage::from_pixel(40, 30, image::Rgba([10, 20, 30, 128])).save(&file)?;
+/// assert!(stereology_segment::read_photo_up_to(&file, 1000).is_err());
+/// let read = stereology_segment::read_photo_up_to(&file, 1200)?;
+/// assert_eq!(read.findings[0].code, "alpha-over-white");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, SegmentError> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
     let refuse = |reason: String| SegmentError::Decode {
         path: path.into(),
         reason,
     };
-    let reader = ImageReader::new(Cursor::new(&bytes))
+    let mut reader = ImageReader::new(Cursor::new(&bytes))
         .with_guessed_format()
         .map_err(|e| refuse(e.to_string()))?;
     if reader.format().is_none() {
@@ -38,12 +68,45 @@ pub fn read_photo(path: impl AsRef<Path>) -> Result<RgbImage, SegmentError> {
     if reader.format() == Some(ImageFormat::Jpeg) && !has_end(&bytes) {
         return Err(refuse("the file is cut short: the JPEG's end is missing".into()));
     }
+    // The number of pixels is limited by `most`, before anything is decoded.
+    reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|e| refuse(e.to_string()))?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > most.min(MOST_PIXELS) {
+        return Err(SegmentError::TooLarge {
+            width,
+            height,
+            most: most.min(MOST_PIXELS),
+            gigabytes: (pixels as f64 * BYTES_A_PIXEL / 1e9).ceil(),
+        });
+    }
     let orientation = decoder.orientation().map_err(|e| refuse(e.to_string()))?;
     let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| refuse(e.to_string()))?;
     picture.apply_orientation(orientation);
-    Ok(over_white(picture))
+    let through = match &picture {
+        p if !p.color().has_alpha() => 0,
+        p => p.to_rgba8().pixels().filter(|p| p[3] < 255).count(),
+    };
+    let finding = || {
+        Finding::new(
+            "alpha-over-white",
+            format!(
+                "{:.1} % of the photo's pixels are transparent and were laid over white; save it without transparency if they are not meant to be white",
+                100.0 * through as f64 / pixels as f64
+            ),
+        )
+    };
+    Ok(PhotoFile {
+        findings: (through > 0).then(finding).into_iter().collect(),
+        photo: over_white(picture),
+    })
 }
+
+/// Pixels that labels of 32 bits and indices can number.
+const MOST_PIXELS: u64 = 1 << 31;
+/// Memory that reading and segmenting take, bytes a pixel.
+const BYTES_A_PIXEL: f64 = 100.0;
 
 /// Whether a JPEG's last scan is followed by the end marker; decoders fill what is missing with grey.
 fn has_end(bytes: &[u8]) -> bool {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::{Rgb, RgbImage};
-use ndarray::{Array3, ArrayView3};
+use ndarray::{Array3, ArrayView3, Axis};
 use stereology_grid::write_atomically;
 use tiff::encoder::{TiffEncoder, colortype};
 
@@ -64,8 +64,8 @@ impl Segmentation {
         out
     }
 
-    /// What [`means`](Self::means) leaves out: photo / 255 − means / 255, axes (y, x, channel), so that means and residual rebuild the photo: to the
-    /// rounding of f32, and exactly once rounded to 8 bits.
+    /// What mean colours leave out: photo / 255 − [`Profile::colour`](crate::Profile::colour), and − [`Binder::colour`](crate::Binder::colour) in the binder, axes (y, x, channel). Its mean over every profile and
+    /// over the binder is 0, and mean colour + residual is the photo, both to the rounding of f32; so is [`means`](Self::means) + residual once rounded to 8 bits.
     ///
     /// # Examples
     ///
@@ -75,19 +75,36 @@ impl Segmentation {
     /// let photo = image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([(x * y) as u8, x as u8, 90]));
     /// let labels = ndarray::Array2::from_shape_fn((20, 20), |(y, _)| u32::from(y < 8));
     /// let segmentation = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?;
-    /// let (means, residual) = (segmentation.means(), segmentation.residual());
-    /// for ((mean, residual), pixel) in means.iter().zip(&residual).zip(photo.iter()) {
-    ///     let rebuilt = (f32::from(*mean) / 255.0 + residual) * 255.0;
-    ///     assert!((rebuilt - f32::from(*pixel)).abs() < 1e-4 && rebuilt.round() == f32::from(*pixel));
+    /// let residual = segmentation.residual();
+    /// let [profile, binder] = [segmentation.profiles[0].colour, segmentation.binder.colour];
+    /// let mut sum = 0.0;
+    /// for ((y, x, c), r) in residual.indexed_iter() {
+    ///     let mean = if y < 8 { profile } else { binder }[c];
+    ///     assert!((mean + f64::from(*r) - f64::from(photo.get_pixel(x as u32, y as u32)[c]) / 255.0).abs() < 1e-7);
+    ///     sum += if y < 8 { f64::from(*r) } else { 0.0 };
     /// }
+    /// assert!(sum.abs() < 1e-5);
     /// # Ok::<(), stereology_segment::SegmentError>(())
     /// ```
     #[must_use]
     pub fn residual(&self) -> Array3<f32> {
-        let means = self.means();
+        let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
+        let index = Index::new(&ids);
         let mut out = Array3::zeros((self.window.height, self.window.width, 3));
-        for ((r, p), m) in out.iter_mut().zip(self.photo.iter()).zip(means.iter()) {
-            *r = (f32::from(*p) - f32::from(*m)) / 255.0;
+        for ((mut r, p), &label) in out
+            .lanes_mut(Axis(2))
+            .into_iter()
+            .zip(self.photo.pixels())
+            .zip(&self.labels)
+        {
+            let mean = if label == 0 {
+                self.binder.colour
+            } else {
+                self.profiles[index.of(label)].colour
+            };
+            for c in 0..3 {
+                r[c] = (f64::from(p[c]) / 255.0 - mean[c]) as f32;
+            }
         }
         out
     }

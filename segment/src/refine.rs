@@ -24,6 +24,18 @@ const MOST_CURVED: f32 = 0.12;
 ///
 /// A core pixel lies at least three pixels deep, or in the deeper part of a small region; other pixels take the nearest core's colour, averaged over the core pixels two around. Pixels beyond the rim, `reach`
 /// pixels out of the mask, get `None`.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array2;
+///
+/// let deviation = Array2::from_shape_fn((20, 20), |(_, x)| [x as f32, 0.0, 0.0]);
+/// let mask = Array2::from_shape_fn((20, 20), |(_, x)| x >= 10);
+/// let cores = stereology_segment::core_colours(&deviation, &mask, 1);
+/// assert_eq!(cores[[10, 10]], cores[[10, 12]]); // three pixels deep is pixel 12
+/// assert!(cores[[10, 9]].is_some() && cores[[10, 8]].is_none());
+/// ```
 #[must_use]
 pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<[f32; 3]>> {
     cores(deviation, mask, reach).mapv(|core| core.map(|(colour, _)| colour))

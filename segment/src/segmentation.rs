@@ -6,14 +6,15 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    binder::{BinderModel, TONE_DISTANCE, densest, length, mean_depth},
-    category::{Category, categorise},
+    binder::{BinderModel, TONE_DISTANCE, densest, length, main_colours, mean_depth},
+    category::{Category, SizeByCategory, categorise, size_by_category},
     error::SegmentError,
     faint::faint_regions,
     finding::Finding,
     lab::{encoded_image, lab_image, smooth},
-    options::{EdgeRule, Holes, SegmentOptions},
+    options::{BinderChoice, Holes, SegmentOptions},
     profile::{Index, Profile, Window, measure, size_of_area, weigh},
+    quality::LEAST_SHARE,
     refine::half_contrast,
     regions::{connected_pieces, fill_holes, hysteresis, open},
     split::{fill_label_holes, split_by_colour, split_by_shape},
@@ -45,6 +46,8 @@ pub struct Segmentation {
     pub number_per_area: f64,
     /// Size of the smallest profile looked for, the circle of [`SegmentOptions::min_area`]: the truncation to hand to unfolding.
     pub min_size: f64,
+    /// Whether profiles of different categories differ in size; `None` for fewer than two categories.
+    pub size_by_category: Option<SizeByCategory>,
     /// What to know before trusting it.
     pub findings: Vec<Finding>,
     pub(crate) photo: RgbImage,
@@ -94,11 +97,22 @@ pub fn segment(
     report(0.0)?;
     let colours = smooth(&encoded_image(photo), options.smoothing);
     report(0.15)?;
-    let given = options.binder.map(|c| c.map(|v| v as f32));
-    let mut binder = match given {
-        Some(colour) => BinderModel::fit_near(&colours, colour),
-        None => BinderModel::fit(&colours, options.seed),
+    let mut binder = match options.binder {
+        BinderChoice::Found => BinderModel::fit(&colours, options.seed),
+        BinderChoice::Colour(colour) => BinderModel::fit_near(&colours, colour.map(|v| v as f32)),
+        BinderChoice::MainColour(number) => {
+            let main = main_colours(&colours, options.seed);
+            let Some((colour, _)) = main.get(number) else {
+                return Err(SegmentError::Option {
+                    option: "binder",
+                    value: number as f64,
+                    requirement: "a main colour of the photo is numbered from 0, and there are at most eight",
+                });
+            };
+            BinderModel::fit_near(&colours, *colour)
+        }
     };
+    let given = options.binder != BinderChoice::Found;
     report(0.3)?;
     let mut deviation = binder.deviation(&colours);
     let mut distance = deviation.mapv(length);
@@ -108,10 +122,10 @@ pub fn segment(
     // Holes in a whole region may be binder between particles that touch: only small ones are filled before it is cut.
     let mut hole_share = HOLE_SHARE;
     let mut share = binder.share();
-    let connected = options.binder.is_some() || surrounds(&distance.mapv(|z| z < low));
+    let connected = given || surrounds(&distance.mapv(|z| z < low));
     let mut clear = connected && stands_out(&distance, low, high);
     let (mut find_faint, mut vague) = (true, false);
-    if !clear && options.binder.is_none() {
+    if !clear && !given {
         let even = binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing));
         let (tones, apart) = BinderModel::fit_two_tones(&even, options.seed);
         let candidates = tones.deviation(&even);
@@ -158,7 +172,7 @@ pub fn segment(
     report(0.6)?;
     let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
     report(0.75)?;
-    let mut labels = split_by_shape(&parts);
+    let mut labels = split_by_shape(&parts, options.rise);
     drop_faint(&mut labels, &distance, &deviation, high, options.min_area);
     if options.holes == Holes::Fill {
         fill_label_holes(&mut labels);
@@ -181,82 +195,8 @@ pub fn segment(
 }
 
 impl Segmentation {
-    /// Profiles of a label map drawn by hand or made by another tool, axes (y, x), 0 the binder. Numbers are kept; a label is one profile even if it is in pieces, which is the finding `split-label`.
-    ///
-    /// # Errors
-    ///
-    /// A map of another size than the photo, without labels, or of three classes instead of profiles; an option out of range.
-    ///
-    /// # Complexity
-    ///
-    /// Linear in pixels.
-    ///
-    /// # Examples
-    ///
-    /// ```
-    /// use stereology_segment::{EdgeRule, SegmentOptions, Segmentation};
-    ///
-    /// let photo = image::RgbImage::from_fn(40, 30, |x, _| image::Rgb([if x < 20 { 200 } else { 40 }; 3]));
-    /// let labels = ndarray::Array2::from_shape_fn((30, 40), |(y, x)| if (5..15).contains(&y) && (22..32).contains(&x) { 7 } else { 0 });
-    /// let segmentation = Segmentation::from_labels(&photo, labels, &SegmentOptions::default().with_edge_rule(EdgeRule::All))?;
-    /// let profile = &segmentation.profiles[0];
-    /// assert_eq!((profile.id, profile.area, profile.x, profile.y), (7, 100.0, 27.0, 10.0));
-    /// assert_eq!(profile.colour, [40.0 / 255.0; 3]);
-    /// # Ok::<(), stereology_segment::SegmentError>(())
-    /// ```
-    pub fn from_labels(photo: &RgbImage, labels: Array2<u32>, options: &SegmentOptions) -> Result<Self, SegmentError> {
-        options.check()?;
-        let (height, width) = labels.dim();
-        let size = [photo.width() as usize, photo.height() as usize];
-        if [width, height] != size {
-            return Err(SegmentError::LabelSize {
-                labels: [width, height],
-                photo: size,
-            });
-        }
-        let largest = labels.iter().copied().max().unwrap_or(0);
-        let (pieces, count) = connected_pieces(&labels, |l| l != 0);
-        if count == 0 {
-            return Err(SegmentError::NoLabels);
-        }
-        // Two profiles may well be labelled 1 and 2; a mask of classes has each in many pieces.
-        if largest == 2 && count > 6 {
-            return Err(SegmentError::ClassMask { pieces: count as usize });
-        }
-        let mut findings = Vec::new();
-        if largest == 255 || largest == 65_535 {
-            findings.push(Finding::new(
-                "clipped-labels",
-                format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles beyond merged into one; export it as 32-bit TIFF"),
-            ));
-        }
-        let in_pieces = labels_in_pieces(&labels, &pieces);
-        if let Some(first) = in_pieces.first() {
-            findings.push(Finding::new(
-                "split-label",
-                format!("{} labels are in more than one piece (the first is {first}); each is counted as one profile of their total area", in_pieces.len()),
-            ));
-        }
-        let given = crate::profile::distinct(&labels).len();
-        let mut out = Self::measured(photo, labels, options);
-        if out.profiles.is_empty() {
-            return Err(SegmentError::NoParticles {
-                min_area: options.min_area,
-            });
-        }
-        if out.profiles.len() < given {
-            findings.push(Finding::new(
-                "small-labels",
-                format!("{} of {given} labels have fewer than {} pixels and are left out; lower the least area to keep them", given - out.profiles.len(), options.min_area),
-            ));
-        }
-        findings.append(&mut out.findings);
-        out.findings = findings;
-        Ok(out)
-    }
-
     /// Everything that follows from labels and photo; labels of small profiles become 0.
-    fn measured(photo: &RgbImage, mut labels: Array2<u32>, options: &SegmentOptions) -> Self {
+    pub(crate) fn measured(photo: &RgbImage, mut labels: Array2<u32>, options: &SegmentOptions) -> Self {
         let mut profiles = measure(photo, &labels, options.min_area);
         let ids: Vec<u32> = profiles.iter().map(|p| p.id).collect();
         labels.mapv_inplace(|l| if ids.binary_search(&l).is_ok() { l } else { 0 });
@@ -276,6 +216,7 @@ impl Segmentation {
             window: Window { width, height, area },
             area_fraction: total / (width * height) as f64,
             number_per_area: profiles.iter().map(|p| p.weight).sum::<f64>() / area,
+            size_by_category: size_by_category(&profiles, options.seed),
             min_size: size_of_area(options.min_area as f64),
             labels,
             profiles,
@@ -306,74 +247,8 @@ impl Segmentation {
         }
         self.profiles.sort_by_key(|p| p.id);
     }
-
-    fn judge_profiles(&mut self, options: &SegmentOptions, cut_short: bool) {
-        let n = self.profiles.len();
-        let percent = |k: usize| 100.0 * k as f64 / n.max(1) as f64;
-        if n < 50 {
-            self.findings.push(Finding::new("few-profiles", format!("{n} profiles; size distributions need at least 50, better some hundreds: use a larger photo, or several")));
-        }
-        let cut = self.profiles.iter().filter(|p| p.touches_edge).count();
-        if options.edge_rule == EdgeRule::Frame && cut_short {
-            self.findings.push(Finding::new("edge-heavy", "profiles reach over more than half the photo; the counting frame is cut short and favours small ones: use a larger photo".into()));
-        } else if percent(cut) > 25.0 {
-            self.findings.push(Finding::new(
-                "edge-heavy",
-                format!(
-                    "{:.0} % of the profiles are cut by the photo's edge; use a larger photo",
-                    percent(cut)
-                ),
-            ));
-        }
-        let small = self
-            .profiles
-            .iter()
-            .filter(|p| p.area < 1.5 * options.min_area as f64)
-            .count();
-        if percent(small) > 15.0 {
-            self.findings.push(Finding::new("near-minimum", format!("{:.0} % of the profiles are within half of the least area of {} pixels: many more may be too small to be seen; use a photo of higher resolution", percent(small), options.min_area)));
-        }
-    }
-
-    /// Pieces of the mask at thresholds a fifth lower and higher.
-    fn judge_count(&mut self, distance: &Array2<f32>, [low, high]: [f32; 2], min_area: usize) {
-        let count = |factor: f32| {
-            let (pieces, count) = connected_pieces(&hysteresis(distance, factor * low, factor * high), |m| m);
-            let mut areas = vec![0_usize; count as usize + 1];
-            pieces.iter().for_each(|&p| areas[p as usize] += 1);
-            areas[1..].iter().filter(|a| **a >= min_area).count()
-        };
-        let (fewer, more) = (count(1.2), count(0.8));
-        let change = 100.0 * fewer.abs_diff(more) as f64 / self.profiles.len().max(1) as f64;
-        if change > UNSTABLE {
-            self.findings.push(Finding::new("unstable-count", format!("moving the thresholds by a fifth either way changes the number of regions by {change:.0} % of the profiles: {more} with lower ones, {fewer} with higher; look at the overlay, or give the thresholds")));
-        }
-    }
-
-    fn judge_binder(&mut self, share: f64, clear: bool) {
-        let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
-        if share < LEAST_SHARE {
-            let share = 100.0 * share;
-            self.findings.push(Finding::new(
-                "no-binder",
-                format!("the likeliest binder covers only {share:.0} % of the photo; {advice}"),
-            ));
-        } else if !clear {
-            self.findings.push(Finding::new("no-binder", format!("most of what differs from the likeliest binder differs by little: its colours go over into those of the rest, and outlines are arbitrary; {advice}")));
-        } else if self.area_fraction > 0.85 {
-            let percent = 100.0 * self.area_fraction;
-            self.findings.push(Finding::new(
-                "no-binder",
-                format!("{percent:.0} % of the photo would be particles; {advice}"),
-            ));
-        }
-    }
 }
 
-/// Change of the number of regions, percent of the profiles, that is worth a warning.
-const UNSTABLE: f64 = 25.0;
-/// Share of the photo that a binder covers at least.
-const LEAST_SHARE: f64 = 0.2;
 /// Thresholds over the usual ones where no binder stands apart.
 const NEAR: f32 = 0.5;
 /// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
@@ -461,21 +336,4 @@ fn drop_faint(labels: &mut Array2<u32>, distance: &Array2<f32>, blunted: &Array2
         .map(|&(strong, all, seen)| all >= 8 * least || (10 * strong >= all && seen >= VISIBLE * all as f64))
         .collect();
     labels.mapv_inplace(|l| if l != 0 && kept[l as usize] { l } else { 0 });
-}
-
-/// Labels whose pixels form several pieces, increasing.
-fn labels_in_pieces(labels: &Array2<u32>, pieces: &Array2<u32>) -> Vec<u32> {
-    let mut pairs: Vec<(u32, u32)> = Vec::new();
-    let mut last = (0, 0);
-    for pair in labels.iter().copied().zip(pieces.iter().copied()) {
-        if pair != last && pair.0 != 0 {
-            pairs.push(pair);
-        }
-        last = pair;
-    }
-    pairs.sort_unstable();
-    pairs.dedup();
-    let mut split: Vec<u32> = pairs.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[0].0).collect();
-    split.dedup();
-    split
 }

@@ -23,12 +23,7 @@ const SPOT: f64 = 0.5;
 /// The same where the colours differ by less than twice what particles must.
 const INLET: f64 = 0.35;
 
-/// Height above the neck, pixels, from which two maxima of the smoothed depth are two particles.
-const LEAST_RISE: f32 = 0.7;
-/// The same as a share of the lower maximum.
-const RELATIVE_RISE: f32 = 0.1;
-
-/// The same for maxima at the photo's edge.
+/// Share of the lower maximum that two maxima at the photo's edge must stand above their neck.
 const CUT_RISE: f32 = 0.3;
 
 /// What is known of a part of a region.
@@ -67,6 +62,17 @@ impl Part {
 /// # Complexity
 ///
 /// Linear in pixels; a few thousand of them are grouped.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array2;
+///
+/// // A region whose left half is dark and whose right half is pale.
+/// let lab = Array2::from_shape_fn((20, 40), |(_, x)| [if x < 20 { 30.0_f32 } else { 80.0 }, 0.0, 0.0]);
+/// let parts = stereology_segment::split_by_colour(&lab, &Array2::from_elem((20, 40), true), 0);
+/// assert!(parts[[10, 5]] != parts[[10, 35]] && parts[[10, 5]] == parts[[2, 15]]);
+/// ```
 #[must_use]
 pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -> Array2<u32> {
     let cores = core_colours(lab, mask, 0);
@@ -181,13 +187,25 @@ fn lined(parts: &Array2<u32>) -> Array2<bool> {
 
 /// Parts cut at their necks: the distance transform, smoothed, has one maximum that stands out for each particle, and a watershed gives each its pixels. Numbers from 1, 0 outside.
 ///
-/// A maximum stands out if it is at least 0.7 pixels and a tenth of its own height above the neck; a relative height keeps large angular particles whole.
+/// A maximum stands out if it is at least `least` pixels and `share` of its own height above the neck (0.7 and a tenth by default); a relative height keeps large angular particles whole.
 ///
 /// # Complexity
 ///
 /// n log n in the pixels of the parts.
+///
+/// # Examples
+///
+/// ```
+/// // Two discs of radius 10 that overlap.
+/// let parts = ndarray::Array2::from_shape_fn((30, 50), |(y, x)| {
+///     let from = |centre: f64| (x as f64 - centre).hypot(y as f64 - 15.0) < 10.0;
+///     u32::from(from(15.0) || from(33.0))
+/// });
+/// let labels = stereology_segment::split_by_shape(&parts, [0.7, 0.1]);
+/// assert!(labels[[15, 15]] != labels[[15, 33]] && labels.iter().all(|l| *l <= 2));
+/// ```
 #[must_use]
-pub fn split_by_shape(parts: &Array2<u32>) -> Array2<u32> {
+pub fn split_by_shape(parts: &Array2<u32>, [least, share]: [f32; 2]) -> Array2<u32> {
     let mask = lined(parts);
     let mut depth = smooth_field(&distance_transform(&mask), 1.0);
     depth.zip_mut_with(&mask, |d, &m| *d = if m { d.min(1e4) } else { 0.0 });
@@ -195,7 +213,7 @@ pub fn split_by_shape(parts: &Array2<u32>) -> Array2<u32> {
     let markers = h_maxima(&depth, |[y, x], rise| {
         // Of a strip cut off by the photo's edge the ridge lies beyond: what is seen of it says little of necks.
         let cut = y == 0 || x == 0 || y + 1 == height || x + 1 == width;
-        LEAST_RISE.max(if cut { CUT_RISE } else { RELATIVE_RISE } * rise)
+        least.max(if cut { share.max(CUT_RISE) } else { share } * rise)
     });
     let mut labels = watershed(&depth, &markers, &mask);
     // The lines between parts go back to the part they were taken from.

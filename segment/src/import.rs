@@ -1,0 +1,137 @@
+//! Label maps of other tools as segmentations.
+
+use image::RgbImage;
+use ndarray::Array2;
+
+use crate::{
+    error::SegmentError,
+    finding::Finding,
+    options::SegmentOptions,
+    profile::distinct,
+    regions::{connected_pieces, neighbours4},
+    segmentation::Segmentation,
+};
+
+/// Pieces from which a map of one or two numbers is a mask.
+const MANY: u32 = 6;
+
+impl Segmentation {
+    /// Profiles of a label map drawn by hand or made by another tool, axes (y, x), 0 the binder. Numbers are kept; a label is one profile even if it is in pieces, which is the finding `split-label`.
+    ///
+    /// # Errors
+    ///
+    /// A map of another size than the photo, without labels, or of three classes instead of profiles; an option out of range.
+    ///
+    /// # Complexity
+    ///
+    /// Linear in pixels.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{EdgeRule, SegmentOptions, Segmentation};
+    ///
+    /// let photo = image::RgbImage::from_fn(40, 30, |x, _| image::Rgb([if x < 20 { 200 } else { 40 }; 3]));
+    /// let labels = ndarray::Array2::from_shape_fn((30, 40), |(y, x)| if (5..15).contains(&y) && (22..32).contains(&x) { 7 } else { 0 });
+    /// let segmentation = Segmentation::from_labels(&photo, labels, &SegmentOptions::default().with_edge_rule(EdgeRule::All))?;
+    /// let profile = &segmentation.profiles[0];
+    /// assert_eq!((profile.id, profile.area, profile.x, profile.y), (7, 100.0, 27.0, 10.0));
+    /// assert_eq!(profile.colour, [40.0 / 255.0; 3]);
+    /// # Ok::<(), stereology_segment::SegmentError>(())
+    /// ```
+    pub fn from_labels(photo: &RgbImage, labels: Array2<u32>, options: &SegmentOptions) -> Result<Self, SegmentError> {
+        options.check()?;
+        let (height, width) = labels.dim();
+        let size = [photo.width() as usize, photo.height() as usize];
+        if [width, height] != size {
+            return Err(SegmentError::LabelSize {
+                labels: [width, height],
+                photo: size,
+            });
+        }
+        let largest = labels.iter().copied().max().unwrap_or(0);
+        let (pieces, count) = connected_pieces(&labels, |l| l != 0);
+        if count == 0 {
+            return Err(SegmentError::NoLabels);
+        }
+        let used = distinct(&labels);
+        if is_mask(&labels, &pieces, count, &used) {
+            return Err(SegmentError::ClassMask {
+                values: used.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and "),
+                pieces: count as usize,
+            });
+        }
+        let mut findings = Vec::new();
+        if largest == 255 || largest == 65_535 {
+            findings.push(Finding::new(
+                "clipped-labels",
+                format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles beyond merged into one; export it as 32-bit TIFF"),
+            ));
+        }
+        let in_pieces = labels_in_pieces(&labels, &pieces);
+        if let Some(first) = in_pieces.first() {
+            findings.push(Finding::new(
+                "split-label",
+                format!("{} labels are in more than one piece (the first is {first}); each is counted as one profile of their total area", in_pieces.len()),
+            ));
+        }
+        let given = used.len();
+        let mut out = Self::measured(photo, labels, options);
+        if out.profiles.is_empty() {
+            return Err(SegmentError::NoParticles {
+                min_area: options.min_area,
+            });
+        }
+        if out.profiles.len() < given {
+            findings.push(Finding::new(
+                "small-labels",
+                format!("{} of {given} labels have fewer than {} pixels and are left out; lower the least area to keep them", given - out.profiles.len(), options.min_area),
+            ));
+        }
+        findings.append(&mut out.findings);
+        out.findings = findings;
+        Ok(out)
+    }
+}
+
+/// Labels whose pixels form several pieces, increasing.
+fn labels_in_pieces(labels: &Array2<u32>, pieces: &Array2<u32>) -> Vec<u32> {
+    let mut pairs: Vec<(u32, u32)> = Vec::new();
+    let mut last = (0, 0);
+    for pair in labels.iter().copied().zip(pieces.iter().copied()) {
+        if pair != last && pair.0 != 0 {
+            pairs.push(pair);
+        }
+        last = pair;
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut split: Vec<u32> = pairs.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[0].0).collect();
+    split.dedup();
+    split
+}
+
+/// Whether a map holds classes (binder, inside, edge; or binder and particle) instead of a number for each profile: one or two numbers in many pieces, or the pieces of one number each in a rim of the other.
+fn is_mask(labels: &Array2<u32>, pieces: &Array2<u32>, count: u32, used: &[u32]) -> bool {
+    if used.len() > 2 {
+        return false;
+    }
+    if count > MANY {
+        return true;
+    }
+    let &[inside, edge] = used else { return false };
+    // For each piece of either number: does anything but the other number touch it?
+    [(inside, edge), (edge, inside)].into_iter().any(|(core, rim)| {
+        let mut cores = 0;
+        let mut bare = vec![false; count as usize + 1];
+        let mut seen = vec![false; count as usize + 1];
+        for ((y, x), _) in labels.indexed_iter().filter(|(_, l)| **l == core) {
+            let piece = pieces[[y, x]] as usize;
+            cores += usize::from(!seen[piece]);
+            seen[piece] = true;
+            bare[piece] |= neighbours4([y, x], labels.dim()).any(|q| labels[q] != core && labels[q] != rim);
+        }
+        let rimmed = seen.iter().zip(&bare).filter(|(s, b)| **s && !**b).count();
+        cores >= 2 && 2 * rimmed > cores
+    })
+}

@@ -24,12 +24,15 @@ const OUTLINES: [[u8; 3]; 8] = [
 ];
 
 impl Segmentation {
-    /// The photo with a line one pixel wide just inside every profile, in the colour of its category.
+    /// The photo with a line one pixel wide just inside every profile, in the colour of its category; what stood out but was left out, as too small or a fleck of texture, is chequered in black.
     #[must_use]
     pub fn overlay(&self) -> RgbImage {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
         let index = Index::new(&ids);
         let mut out = self.photo.clone();
+        for &[y, x] in self.rejected.iter().filter(|[y, x]| (y + x) % 2 == 0) {
+            out.put_pixel(x as u32, y as u32, Rgb([0; 3]));
+        }
         for ((y, x), &label) in self.labels.indexed_iter().filter(|(_, l)| **l != 0) {
             if neighbours4([y, x], self.labels.dim()).any(|q| self.labels[q] != label) {
                 let category = usize::from(self.profiles[index.of(label)].category);

@@ -11,6 +11,8 @@ use crate::{
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 const CORE_DEPTH: f32 = 3.0;
+/// The same in standard deviations of the blur.
+const CLEAR_OF_BLUR: f32 = 2.2;
 /// The same for small regions, as a share of the greatest depth within three pixels.
 const CORE_SHARE: f32 = 0.9;
 /// Pixels that an outline may move out in one call.
@@ -38,11 +40,16 @@ const MOST_CURVED: f32 = 0.12;
 /// ```
 #[must_use]
 pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<[f32; 3]>> {
-    cores(deviation, mask, reach).mapv(|core| core.map(|(colour, _)| colour))
+    cores(deviation, mask, reach, CORE_DEPTH).mapv(|core| core.map(|(colour, _)| colour))
 }
 
 /// [`core_colours`], with the greatest depth in the core's piece of the mask.
-fn cores(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<([f32; 3], f32)>> {
+fn cores(
+    deviation: &Array2<[f32; 3]>,
+    mask: &Array2<bool>,
+    reach: u8,
+    core_depth: f32,
+) -> Array2<Option<([f32; 3], f32)>> {
     let dim = mask.dim();
     let depth = distance_transform(mask);
     let (pieces, count) = connected_pieces(mask, |m| m);
@@ -58,8 +65,8 @@ fn cores(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2
     let mut core = Array2::from_elem(dim, false);
     let mut places = Vec::new();
     for ((y, x), &d) in depth.indexed_iter() {
-        let deepest_around = || square([y, x], 3).map(|q| depth[q]).fold(0.0, f32::max);
-        if mask[[y, x]] && (d >= CORE_DEPTH || d >= CORE_SHARE * deepest_around()) {
+        let deepest_around = || square([y, x], core_depth as usize).map(|q| depth[q]).fold(0.0, f32::max);
+        if mask[[y, x]] && (d >= core_depth || d >= CORE_SHARE * deepest_around()) {
             core[[y, x]] = true;
             places.push([y, x]);
         }
@@ -122,7 +129,7 @@ fn cores(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2
 pub fn half_contrast(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, blur: f32) -> Array2<bool> {
     let mut out = Array2::from_elem(mask.dim(), false);
     Zip::from(&mut out)
-        .and(&cores(deviation, mask, REACH))
+        .and(&cores(deviation, mask, REACH, CORE_DEPTH.max(CLEAR_OF_BLUR * blur)))
         .and(deviation)
         .for_each(|keep, core, d| {
             let Some((c, radius)) = core else { return };

@@ -51,6 +51,8 @@ pub struct Segmentation {
     /// What to know before trusting it.
     pub findings: Vec<Finding>,
     pub(crate) photo: RgbImage,
+    /// Pixels that stood out but were left out: too small, or flecks.
+    pub(crate) rejected: Vec<[usize; 2]>,
 }
 
 /// Where a segmentation stands, 0 to 1, and whether to go on.
@@ -184,6 +186,8 @@ pub fn segment(
             min_area: options.min_area,
         });
     }
+    let left_out = mask.indexed_iter().filter(|(p, m)| **m && out.labels[*p] == 0);
+    out.rejected = left_out.map(|((y, x), _)| [y, x]).collect();
     out.renumber();
     out.judge_binder(share, clear);
     if vague {
@@ -223,6 +227,7 @@ impl Segmentation {
             categories,
             findings: Vec::new(),
             photo: photo.clone(),
+            rejected: Vec::new(),
         };
         out.judge_profiles(options, cut_short);
         out

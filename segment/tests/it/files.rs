@@ -2,7 +2,9 @@
 
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage, Rgba};
 use ndarray::Array2;
-use stereology_segment::{SegmentError, SegmentOptions, Segmentation, read_labels, read_photo, write_labels};
+use stereology_segment::{
+    SegmentError, SegmentOptions, Segmentation, read_labels, read_labels_for, read_photo, write_labels,
+};
 use tiff::encoder::{TiffEncoder, colortype};
 
 /// 16 bits are rounded, grey becomes colour, transparency shows white.
@@ -136,4 +138,165 @@ fn lying_headers() {
     std::fs::write(&file, bytes).unwrap();
     let refused = read_labels(&file).unwrap_err().to_string();
     assert!(refused.contains("labels.tif"), "{refused}");
+}
+
+/// Every kind of label file gives back numbers, pieces, holes and touching labels as they were.
+#[test]
+fn label_files_round_trip() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut labels = Array2::from_shape_fn((60, 90), |(y, x)| {
+        let from = |cx: f64, cy: f64| (x as f64 - cx).hypot(y as f64 - cy);
+        match () {
+            () if from(20.0, 20.0) < 6.0 => 0, // a hole
+            () if from(20.0, 20.0) < 12.0 => 7,
+            () if from(42.0, 20.0) < 10.5 => 3, // touches 7
+            () if from(70.0, 15.0) < 5.0 || from(75.0, 45.0) < 8.0 => 900, // in two pieces
+            () if from(0.0, 59.0) < 14.0 => 1,  // at the corner
+            () => 0,
+        }
+    });
+    labels[[30, 80]] = 65_000;
+    for name in ["l.tif", "l.png", "l.npy", "l.geojson", "l.json", "l.zip"] {
+        let file = folder.path().join(name);
+        write_labels(&file, labels.view()).unwrap();
+        let read = read_labels_for(&file, (60, 90)).unwrap();
+        assert_eq!((read.labels, read.findings.len()), (labels.clone(), 0), "{name}");
+        let once = std::fs::read(&file).unwrap();
+        write_labels(&file, labels.view()).unwrap();
+        assert_eq!(once, std::fs::read(&file).unwrap(), "{name}");
+        // A photo of another size.
+        if name.starts_with("l.g") || name.ends_with("json") || name.ends_with("zip") {
+            assert!(
+                matches!(read_labels_for(&file, (30, 40)), Err(SegmentError::LabelFormat { .. })),
+                "{name}"
+            );
+        }
+    }
+    labels[[30, 80]] = 70_000;
+    assert!(write_labels(folder.path().join("l.png"), labels.view()).is_err());
+    assert!(write_labels(folder.path().join("l.bmp"), labels.view()).is_err());
+}
+
+/// Numbers of fewer than eight bits are labels, not shades; TIFFs that show 0 as white hold the numbers they hold; NumPy arrays of any order and kind.
+#[test]
+fn labels_as_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("l");
+    let wanted = ndarray::array![[0, 3, 15], [7, 0, 1]];
+    let mut encoder = png::Encoder::new(std::fs::File::create(&file).unwrap(), 3, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Four);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&[0x03, 0xf0, 0x70, 0x10])
+        .unwrap();
+    assert_eq!(read_labels(&file).unwrap(), wanted);
+    let mut out = std::fs::File::create(&file).unwrap();
+    let mut encoder = TiffEncoder::new(&mut out).unwrap();
+    let mut picture = encoder.new_image::<colortype::Gray8>(3, 2).unwrap();
+    picture
+        .encoder()
+        .write_tag(tiff::tags::Tag::PhotometricInterpretation, 0_u16)
+        .unwrap();
+    picture.write_data(&[0, 3, 15, 7, 0, 1]).unwrap();
+    encoder.write_image::<colortype::Gray8>(3, 2, &[9; 6]).unwrap();
+    let read = read_labels_for(&file, (2, 3)).unwrap();
+    assert_eq!((read.labels, read.findings[0].code), (wanted.clone(), "first-page"));
+    for (kind, fortran, bytes) in [
+        (
+            "<i8",
+            "False",
+            [0_i64, 3, 15, 7, 0, 1]
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect::<Vec<u8>>(),
+        ),
+        (
+            ">u2",
+            "True",
+            [0_u16, 7, 3, 0, 15, 1].iter().flat_map(|v| v.to_be_bytes()).collect(),
+        ),
+        (
+            "<f4",
+            "False",
+            [0_f32, 3.0, 15.0, 7.0, 0.0, 1.0]
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect(),
+        ),
+    ] {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': {fortran}, 'shape': (2, 3), }}\n");
+        let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+        npy.extend((header.len() as u16).to_le_bytes());
+        npy.extend(header.as_bytes());
+        npy.extend(bytes);
+        std::fs::write(&file, &npy).unwrap();
+        assert_eq!(read_labels(&file).unwrap(), wanted, "{kind}");
+        std::fs::write(&file, &npy[..npy.len() - 1]).unwrap();
+        assert!(read_labels(&file).is_err());
+        let pickled = String::from_utf8_lossy(&npy).replace(kind, "|O");
+        std::fs::write(
+            &file,
+            [
+                b"\x93NUMPY\x01\x00",
+                &pickled.as_bytes()[pickled.find('v').unwrap_or(0)..],
+            ]
+            .concat(),
+        )
+        .unwrap();
+        assert!(read_labels(&file).is_err());
+    }
+}
+
+/// Polygons of other tools: QGIS's y up, features without numbers, overlaps, points.
+#[test]
+fn foreign_outlines() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("l.geojson");
+    let read = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        read_labels_for(&file, (20, 20))
+    };
+    let square = |x: f64, y: f64, side: f64, down: f64| {
+        let (r, b) = (x + side, y + down * side);
+        format!(
+            r#"{{"type": "Feature", "geometry": {{"type": "Polygon", "coordinates": [[[{x},{y}],[{r},{y}],[{r},{b}],[{x},{b}],[{x},{y}]]]}}}}"#
+        )
+    };
+    let all = |features: &[String]| {
+        format!(
+            r#"{{"type": "FeatureCollection", "features": [{}]}}"#,
+            features.join(",")
+        )
+    };
+    let count = |labels: &Array2<u32>, l: u32| labels.iter().filter(|v| **v == l).count();
+    // segmenteverygrain: pixel centres at whole numbers.
+    let found = read(&all(&[square(0.5, 0.5, 4.0, 1.0), square(9.5, 9.5, 5.0, 1.0)])).unwrap();
+    assert_eq!(
+        (count(&found.labels, 1), count(&found.labels, 2), found.labels[[1, 1]]),
+        (16, 25, 1)
+    );
+    let qgis = read(&all(&[square(1.0, -1.0, 4.0, -1.0)])).unwrap();
+    assert_eq!(
+        (count(&qgis.labels, 1), qgis.labels[[1, 1]], qgis.labels[[0, 0]]),
+        (16, 1, 0)
+    );
+    let over = read(&all(&[square(0.5, 0.5, 2.0, 1.0), square(0.5, 0.5, 4.0, 1.0)])).unwrap();
+    assert_eq!(
+        (count(&over.labels, 1), count(&over.labels, 2), over.findings[0].code),
+        (4, 12, "overlapping-labels")
+    );
+    let far = read(&all(&[square(100.0, 0.5, 2.0, 1.0)])).unwrap_err().to_string();
+    assert!(far.contains("20x20"), "{far}");
+    for bad in [
+        "{",
+        "{}",
+        r#"{"type": "Feature", "geometry": {"type": "Point", "coordinates": [1, 2]}}"#,
+        "PK\u{3}\u{4}",
+        "\u{80}pickle",
+        "hello",
+    ] {
+        assert!(matches!(read(bad), Err(SegmentError::LabelFormat { .. })), "{bad}");
+    }
 }

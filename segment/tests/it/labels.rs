@@ -68,8 +68,31 @@ fn refused() {
     let classes = squares(&[1, 2, 1, 2, 1, 2, 1, 2]);
     assert!(matches!(
         Segmentation::from_labels(&photo, classes, &options),
-        Err(SegmentError::ClassMask { pieces: 8 })
+        Err(SegmentError::ClassMask { pieces: 8, .. })
     ));
+}
+
+/// Masks of classes are refused however few their pieces: two particles, each in a rim; two labels side by side are not one.
+#[test]
+fn sparse_masks() {
+    let options = SegmentOptions::default();
+    let rimmed = Array2::from_shape_fn((40, 80), |(y, x)| {
+        let from = |c: f64| (x as f64 - c).hypot(y as f64 - 20.0);
+        let d = from(20.0).min(from(60.0));
+        if d < 10.0 { 1 } else { u32::from(d < 13.0) * 2 }
+    });
+    let swapped = rimmed.mapv(|l| [0, 2, 1][l as usize]);
+    for mask in [rimmed.clone(), swapped] {
+        let refused = Segmentation::from_labels(&colours(80, 40), mask, &options);
+        assert!(matches!(refused, Err(SegmentError::ClassMask { .. })));
+    }
+    let binary = squares(&[255; 8]);
+    assert!(matches!(
+        Segmentation::from_labels(&colours(80, 40), binary, &options),
+        Err(SegmentError::ClassMask { .. })
+    ));
+    assert!(Segmentation::from_labels(&colours(20, 40), squares(&[1, 2]), &options).is_ok());
+    assert!(Segmentation::from_labels(&colours(20, 40), squares(&[1, 1]), &options).is_ok());
 }
 
 /// Small labels are left out, and the result says so.

@@ -126,6 +126,60 @@ fn nothing_to_separate() {
     ));
 }
 
+/// Two rows less move the mean area of inner profiles by less than half a percent.
+#[test]
+fn cropping_two_rows() {
+    for seed in [4, 9] {
+        let whole = photo(&discs(24, SIZE, seed), SIZE, seed);
+        let cut = imageops::crop_imm(&whole, 0, 2, SIZE[0], SIZE[1] - 2).to_image();
+        let mean = |found: &Segmentation, from: f64| {
+            let inner = found.profiles.iter().filter(|p| !p.touches_edge && p.y > from);
+            let areas: Vec<f64> = inner.map(|p| p.area).collect();
+            areas.iter().sum::<f64>() / areas.len() as f64
+        };
+        let moved = mean(&run(&cut), 38.0) / mean(&run(&whole), 40.0);
+        assert!((moved - 1.0).abs() < 0.005, "{moved}");
+    }
+}
+
+/// The residual has no mean in any profile nor in the binder.
+#[test]
+fn residual_has_no_mean() {
+    let found = run(&photo(&discs(24, SIZE, 6), SIZE, 6));
+    let mut sums = vec![[0.0_f64; 3]; found.profiles.len() + 1];
+    for ((y, x, c), r) in found.residual().indexed_iter() {
+        sums[found.labels[[y, x]] as usize][c] += f64::from(*r);
+    }
+    let areas = std::iter::once(1e4).chain(found.profiles.iter().map(|p| p.area));
+    for (sum, area) in sums.iter().zip(areas) {
+        assert!(sum.iter().all(|s| (s / area).abs() < 1e-6), "{sum:?}");
+    }
+}
+
+/// Discs sixteen levels lighter than a binder whose texture has eight levels of scatter are found where the texture is averaged away.
+#[test]
+fn faint_discs() {
+    let drawn = discs(12, SIZE, 2);
+    let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
+    let photo = RgbImage::from_fn(SIZE[0], SIZE[1], |x, y| {
+        let inside = drawn
+            .iter()
+            .any(|d| (f64::from(x) + 0.5 - d.centre[0]).hypot(f64::from(y) + 0.5 - d.centre[1]) < d.radius);
+        let texture = 28.0 * rand::RngExt::random::<f64>(&mut rng);
+        Rgb([((if inside { 116.0 } else { 100.0 }) + texture) as u8; 3])
+    });
+    let found = run(&photo);
+    let large = drawn.iter().filter(|d| d.radius > 8.0);
+    for d in large {
+        let nearest = found
+            .profiles
+            .iter()
+            .map(|p| (p.x - d.centre[0]).hypot(p.y - d.centre[1]))
+            .fold(f64::INFINITY, f64::min);
+        assert!(nearest < 2.0, "radius {}: {nearest}", d.radius);
+    }
+}
+
 /// A cancelled call says so.
 #[test]
 fn cancelled() {

@@ -135,19 +135,57 @@ impl FromStr for Edges {
     }
 }
 
-/// A colour `R,G,B`, each 0 to 255.
+/// The binder: its colour `R,G,B`, each 0 to 255, or the number of one of the photograph's main colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Colour(pub [u8; 3]);
+pub enum BinderArgument {
+    Colour([u8; 3]),
+    MainColour(usize),
+}
 
-impl FromStr for Colour {
+impl FromStr for BinderArgument {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let parts: Result<Vec<u8>, _> = text.split(',').map(|part| part.trim().parse()).collect();
         match parts.as_deref() {
-            Ok(&[r, g, b]) => Ok(Self([r, g, b])),
-            _ => Err("a colour is three whole numbers from 0 to 255, such as 120,110,100".to_owned()),
+            Ok(&[r, g, b]) => Ok(Self::Colour([r, g, b])),
+            Ok(&[number @ 0..=7]) => Ok(Self::MainColour(usize::from(number))),
+            _ => Err(
+                "a colour is three whole numbers from 0 to 255, such as 120,110,100; a main colour of the photograph one from 0 to 7"
+                    .to_owned(),
+            ),
         }
+    }
+}
+
+/// A number of categories, or how to choose it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CategoriesArgument {
+    Count(usize),
+    Silhouette,
+    Gap,
+}
+
+impl FromStr for CategoriesArgument {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "silhouette" => Ok(Self::Silhouette),
+            "gap" => Ok(Self::Gap),
+            number => count(number)
+                .map(Self::Count)
+                .map_err(|_| "a whole number from 1 to 255, `silhouette` or `gap` is needed".to_owned()),
+        }
+    }
+}
+
+/// Two finite numbers `A,B`.
+pub fn pair(text: &str) -> Result<[f32; 2], String> {
+    let parts = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
+    match *parts {
+        [a, b] => Ok([a as f32, b as f32]),
+        _ => Err("two numbers are needed, such as 5,9".to_owned()),
     }
 }
 
@@ -236,7 +274,7 @@ pub fn shares(shapes: &[ShapeShare]) -> Result<Vec<f64>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Colour, Edges, Extent, ShapeShare, Triple, positive, shares};
+    use super::{BinderArgument, Edges, Extent, ShapeShare, Triple, positive, shares};
 
     #[test]
     fn numbers_are_finite_and_in_range() {
@@ -250,8 +288,8 @@ mod tests {
     fn lists_are_checked() {
         assert_eq!("0,1,2.5".parse(), Ok(Edges(vec![0.0, 1.0, 2.5])));
         assert!("0,1,1".parse::<Edges>().is_err() && "1".parse::<Edges>().is_err());
-        assert_eq!("1,2,255".parse(), Ok(Colour([1, 2, 255])));
-        assert!("1,2,256".parse::<Colour>().is_err() && "1,2".parse::<Colour>().is_err());
+        assert_eq!("1,2,255".parse(), Ok(BinderArgument::Colour([1, 2, 255])));
+        assert!("1,2,256".parse::<BinderArgument>().is_err() && "1,2".parse::<BinderArgument>().is_err());
         assert_eq!("0,0,1".parse(), Ok(Triple([0.0, 0.0, 1.0])));
         assert_eq!("32,64".parse(), Ok(Extent(vec![32, 64])));
         assert!("0".parse::<Extent>().is_err() && "1,2,3,4".parse::<Extent>().is_err());

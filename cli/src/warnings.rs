@@ -6,6 +6,16 @@ pub use stereology::pipeline::Warning;
 /// Every code, in alphabetical order: (code, what it means, what to do). `docs/cli.md` and the report show this table.
 pub const CODES: &[(&str, &str, &str)] = &[
     (
+        "alpha-over-white",
+        "Some of the photograph is transparent; it was laid over white.",
+        "Save the photograph without transparency if that is not meant.",
+    ),
+    (
+        "area-fraction",
+        "Less than 1 % or more than 70 % of the photograph are profiles.",
+        "Look at overlay.png; give the binder's colour with --binder, or import a label map with --labels FILE.",
+    ),
+    (
         "box-rounded",
         "The box's side was rounded to a whole number of periods of the texture, so that the solid repeats.",
         "Nothing, unless you need exactly that side: then choose --box as a multiple of the texture's period.",
@@ -51,6 +61,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Give a smaller --box, or raise --min-size if they are not needed.",
     ),
     (
+        "first-page",
+        "The label TIFF has several pages; the first one was taken.",
+        "Save the page that belongs to the photograph alone.",
+    ),
+    (
         "fraction-mismatch",
         "The particles' volume fraction by unfolding and the photograph's area fraction differ by more than 10 %, though on average they must agree.",
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
@@ -59,6 +74,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "levels-reduced",
         "The pyramid has fewer levels than asked for: the picture or the result is too small.",
         "Use a larger picture, or fewer --levels.",
+    ),
+    (
+        "lost-labels",
+        "Some outlines of the label file hold no pixel of their own (points, lines, slivers, or covered by others).",
+        "Nothing, or correct them in the tool they come from.",
     ),
     (
         "mesh-repaired",
@@ -96,6 +116,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Use as many --bins as the message names, --method auto, or photographs of a larger area.",
     ),
     (
+        "overlapping-labels",
+        "Outlines of the label file overlap; pixels in several went to the smallest.",
+        "Correct the outlines in the tool they come from if that is not meant.",
+    ),
+    (
         "paper-normalisation",
         "The paper's normalisation counts one profile a hit, but planes through this body show more.",
         "Leave --paper out for densities; use it to compare with the paper's figures.",
@@ -129,6 +154,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "unstable-count",
         "The number of profiles changes much when the thresholds move a little.",
         "Look at overlay.png; import a label map with --labels FILE if the particles are not outlined well.",
+    ),
+    (
+        "vague-binder",
+        "The binder's colours go over into those of particles: outlines are approximate, and particles of the binder's own colours are missed.",
+        "Look at overlay.png; give the binder's colour with --binder, or correct the labels by hand (--labels-out, --labels).",
     ),
 ];
 

@@ -15,7 +15,7 @@ const FEW: usize = 50;
 const EDGE: f64 = 20.0;
 /// Percent of the profiles near the least area that is worth a warning.
 const SMALL: f64 = 10.0;
-/// Change of the number of regions, percent, that is worth a warning.
+/// Change of the number of regions, percent of the profiles, that is worth a warning.
 const UNSTABLE: f64 = 10.0;
 /// Area fractions beyond which something is wrong, or unusual.
 const USUAL: std::ops::RangeInclusive<f64> = 0.01..=0.7;
@@ -59,9 +59,9 @@ impl Segmentation {
     /// Regions at thresholds a fifth lower and higher.
     pub(crate) fn judge_count(&mut self, distance: &Array2<f32>, [low, high]: [f32; 2], min_area: usize) {
         let [fewer, here, more] = [1.2, 1.0, 0.8].map(|f| regions(distance, f * low, f * high, min_area));
-        let change = 100.0 * fewer.abs_diff(here).max(more.abs_diff(here)) as f64 / here.max(1) as f64;
+        let change = 100.0 * fewer.abs_diff(here).max(more.abs_diff(here)) as f64 / self.profiles.len().max(1) as f64;
         if change > UNSTABLE {
-            self.findings.push(Finding::new("unstable-count", format!("moving the thresholds by a fifth changes the number of regions by {change:.0} %: {here}, {more} with lower ones, {fewer} with higher; look at the overlay, or give the thresholds")));
+            self.findings.push(Finding::new("unstable-count", format!("moving the thresholds by a fifth changes the number of regions by {change:.0} % of the profiles: {here}, {more} with lower ones, {fewer} with higher; look at the overlay, or give the thresholds")));
         }
     }
 

@@ -65,7 +65,11 @@ fn cores(
     let mut core = Array2::from_elem(dim, false);
     let mut places = Vec::new();
     for ((y, x), &d) in depth.indexed_iter() {
-        let deepest_around = || square([y, x], core_depth as usize).map(|q| depth[q]).fold(0.0, f32::max);
+        let deepest_around = || {
+            square([y, x], core_depth as usize)
+                .map(|q| depth[q])
+                .fold(0.0, f32::max)
+        };
         if mask[[y, x]] && (d >= core_depth || d >= CORE_SHARE * deepest_around()) {
             core[[y, x]] = true;
             places.push([y, x]);

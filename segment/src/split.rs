@@ -98,7 +98,7 @@ pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -
             squares: c.iter().map(|v| v * v).sum::<f64>() * weight,
             count: weight,
             depth: depth[[y, x]],
-// The photo's edge is no contact.
+            // The photo's edge is no contact.
             outline: (4 - neighbours4([y, x], parts.dim()).filter(|&q| parts[q] == part).count()) as f64,
         });
         for q in neighbours4([y, x], parts.dim()) {

@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod figures;
+mod label_scores;
 mod sample;
 mod sand;
 mod tidy;

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use stereology::segment::{self, SegmentOptions, Segmentation, read_labels, read_photo, write_labels};
+use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, read_photo_up_to, write_labels};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::numbers::{percent, significant};
-use crate::outputs::{OutputFolder, write_json, write_text};
+use crate::outputs::{OutputFolder, check_file, write_json, write_text};
 use crate::progress::{Step, go_on};
-use crate::values::{Colour, count, positive};
+use crate::values::{BinderArgument, CategoriesArgument, pair, positive};
 use crate::warnings::Warning;
 
 /// Finds the profiles of particles on a photograph of a cut
@@ -34,6 +34,13 @@ pub struct Segment {
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Write the labels to further files too, to correct them in another tool and come back with --labels; the ending tells the kind: .tif, .png, .npy (napari), .zip (Fiji's ROI manager), .geojson (QGIS),
+    /// .json (COCO)
+    #[arg(long, value_name = "FILE")]
+    pub labels_out: Vec<PathBuf>,
+    /// Refuse photographs of more pixels; segmenting takes about 100 bytes a pixel
+    #[arg(long, value_name = "N", default_value_t = 150_000_000)]
+    pub max_pixels: u64,
     #[command(flatten)]
     pub choices: Choices,
 }
@@ -43,18 +50,27 @@ pub struct Segment {
 #[command(next_help_heading = "Segmentation")]
 #[group(id = "segment-choices")]
 pub struct Choices {
-    /// Label map of another tool (TIFF or PNG, 0 = binder) instead of segmenting
+    /// Label map of another tool instead of segmenting: TIFF, PNG or .npy of numbers (0 = binder), GeoJSON polygons, ImageJ ROI zip, COCO annotations
     #[arg(long, value_name = "FILE")]
     pub labels: Option<PathBuf>,
-    /// Colour of the binder, 0 to 255 [default: found in the photograph]
-    #[arg(long, value_name = "R,G,B")]
-    pub binder: Option<Colour>,
+    /// Colour of the binder, 0 to 255, or N for the Nth of the photograph's main colours, from 0 [default: found in the photograph]
+    #[arg(long, value_name = "R,G,B|N")]
+    pub binder: Option<BinderArgument>,
     /// Smallest area of a profile in pixels
     #[arg(long, value_name = "PX", value_parser = positive)]
     pub min_area: Option<f64>,
-    /// Number of colour categories of the particles
-    #[arg(long, value_name = "K", value_parser = count)]
-    pub categories: Option<usize>,
+    /// Number of colour categories of the particles, or how to choose it: `silhouette` or `gap` [default: silhouette]
+    #[arg(long, value_name = "K|HOW")]
+    pub categories: Option<CategoriesArgument>,
+    /// Standard deviation of the smoothing before segmenting, in pixels
+    #[arg(long, value_name = "PX", default_value_t = 1.0)]
+    pub smoothing: f32,
+    /// Distances to the binder, in its standard deviations, at which a particle ends and which it must reach
+    #[arg(long, value_name = "LOW,HIGH", default_value = "5,9", value_parser = pair)]
+    pub thresholds: [f32; 2],
+    /// Height above their neck from which touching parts are particles of their own: pixels, and share of their depth
+    #[arg(long, value_name = "PX,SHARE", default_value = "0.7,0.1", value_parser = pair)]
+    pub rise: [f32; 2],
     /// Holes in profiles: filled, or kept (for particles with annular sections)
     #[arg(long, value_enum, default_value_t = Holes::Fill)]
     pub holes: Holes,
@@ -97,27 +113,44 @@ impl Choices {
                 EdgeRule::MilesLantuejoul => segment::EdgeRule::MilesLantuejoul,
                 EdgeRule::All => segment::EdgeRule::All,
             });
-        if let Some(Colour(rgb)) = self.binder {
-            options = options.with_binder(rgb.map(|channel| f64::from(channel) / 255.0));
-        }
+        let ([low, high], [pixels, share]) = (self.thresholds, self.rise);
+        options = options
+            .with_smoothing(self.smoothing)
+            .with_thresholds(low, high)
+            .with_rise(pixels, share);
+        options = match self.binder {
+            Some(BinderArgument::Colour(rgb)) => options.with_binder(rgb.map(|channel| f64::from(channel) / 255.0)),
+            Some(BinderArgument::MainColour(number)) => options.with_main_colour(number),
+            None => options,
+        };
         if let Some(area) = self.min_area {
             options = options.with_min_area(area.ceil() as usize);
         }
-        if let Some(categories) = self.categories {
-            options = options.with_categories(categories);
+        match self.categories {
+            Some(CategoriesArgument::Count(categories)) => options.with_categories(categories),
+            Some(CategoriesArgument::Gap) => options.with_gap(),
+            Some(CategoriesArgument::Silhouette) | None => options,
         }
-        options
     }
 }
 
 impl Segment {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        for path in &self.labels_out {
+            check_file(path, everywhere.force)?;
+        }
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
-        let photo = read_photo(&self.photo).at(&self.photo)?;
+        let read = read_photo_up_to(&self.photo, self.max_pixels).at(&self.photo)?;
+        let (photo, mut findings) = (read.photo, read.findings);
         let options = self.choices.options(everywhere.seed);
         let step = Step::begin("segmenting", everywhere.quiet);
         let found = match &self.choices.labels {
-            Some(labels) => Segmentation::from_labels(&photo, read_labels(labels).at(labels)?, &options).at(labels)?,
+            Some(path) => {
+                let size = (photo.height() as usize, photo.width() as usize);
+                let read = read_labels_for(path, size).at(path)?;
+                findings.extend(read.findings);
+                Segmentation::from_labels(&photo, read.labels, &options).at(path)?
+            }
             None => segment::segment(&photo, &options, &|done| step.at(done)).at(&self.photo)?,
         };
         drop(step);
@@ -126,7 +159,8 @@ impl Segment {
         for (name, value) in figures(&found, everywhere.scale) {
             answer.field(name, value);
         }
-        for finding in &found.findings {
+        findings.extend(found.findings.iter().cloned());
+        for finding in &findings {
             answer.warn(Warning::new(finding.code, finding.message.clone()));
         }
         let (window, scale) = (found.window, everywhere.scale);
@@ -151,6 +185,9 @@ impl Segment {
                 self.output.join("overlay.png").display()
             ));
         write_files(&folder, &found, scale)?;
+        for path in &self.labels_out {
+            write_labels(path, found.labels.view()).at(path)?;
+        }
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
         folder.publish()?;
@@ -197,6 +234,13 @@ pub fn figures(found: &Segmentation, scale: f64) -> Vec<(&'static str, Value)> {
         ),
         ("binder", json!(found.binder.colour.map(|c| 255.0 * c))),
         ("category_colours", json!(colours)),
+        (
+            "size_by_category",
+            found.size_by_category.map_or(
+                Value::Null,
+                |test| json!({ "test": "kruskal-wallis", "statistic": test.statistic, "p_value": test.p_value }),
+            ),
+        ),
     ]
 }
 

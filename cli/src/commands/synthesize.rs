@@ -14,7 +14,7 @@ use stereology::pipeline::{
 use stereology::pyramid::TextureReport;
 use stereology::render::{BlockOptions, render_block};
 use stereology::sample;
-use stereology::segment::{read_labels, read_photo};
+use stereology::segment::{read_labels_for, read_photo};
 use stereology::volume::{Channel, SlicePlane};
 
 use crate::answer::Answer;
@@ -113,8 +113,9 @@ impl Synthesize {
             .segment
             .labels
             .as_ref()
-            .map(|path| read_labels(path).at(path))
+            .map(|path| read_labels_for(path, (photo.height() as usize, photo.width() as usize)).at(path))
             .transpose()?;
+        let (labels, noticed) = labels.map_or((None, Vec::new()), |read| (Some(read.labels), read.findings));
         let stages = Stages::begin(everywhere.quiet);
         let synthesis = pipeline::synthesize(&photo, labels, &types, &options, &|step, done| {
             stages.at(step.name(), done)
@@ -122,6 +123,9 @@ impl Synthesize {
         .map_err(|error| self.failure(error))?;
         go_on()?;
         let mut answer = self.answer(&synthesis);
+        for finding in noticed {
+            answer.warn(crate::warnings::Warning::new(finding.code, finding.message));
+        }
         self.write(&folder, &synthesis, &types, &name, everywhere, &stages)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;

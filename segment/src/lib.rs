@@ -11,6 +11,10 @@
 //! The binder is found, not given: it is the colour that most pixels share for how little it scatters, under light that may change across the photo as a quadratic surface. Particles may be lighter and darker
 //! than it at once, which no single threshold of grey levels can separate. Half contrast keeps areas unbiased: outlines at the threshold itself would make every profile about a fifth too large.
 //!
+//! On thirty drawn aggregates with exact truth, ten of each kind (easy; medium; hard: uneven light, noise, JPEG), mean AP50 is .998, .985, .986 and the area fraction off by .0, .3, .5 %. What helped, over 8-means and
+//! half contrast alone: a second look at what is fainter than the binder's texture ([`faint_regions`]; medium +.006, hard +.003), spots that share half their outline with a particle given back to it (hard
+//! +.013), outlines by lightness as well as hue, with small flecks of compression dropped (hard +.011, area error halved). A majority filter of outlines did not help, nor do gradients replace half contrast.
+//!
 //! # A photo of discs
 //!
 //! ```

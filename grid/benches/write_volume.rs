@@ -20,7 +20,7 @@ fn formats(c: &mut Criterion) {
         .sample_size(20)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
-    for format in [Format::Npy, Format::Nrrd, Format::Vti, Format::Tiff] {
+    for format in Format::ALL {
         let file = folder.path().join(format!("volume{format}"));
         group.bench_function(format.to_string(), |b| {
             b.iter(|| {

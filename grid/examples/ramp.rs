@@ -24,7 +24,7 @@ fn main() -> Result<(), GridError> {
         }
         ControlFlow::Continue(())
     };
-    for format in [Format::Npy, Format::Nrrd, Format::Vti, Format::Tiff] {
+    for format in Format::ALL {
         let file = folder.join(format!("ramp{format}"));
         write_volume::<u8>(&file, format, shape, [0.5, 1.0, 2.0], ramp)?;
         println!("{}", file.display());

@@ -2,7 +2,7 @@
 
 use crate::GridError;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file so that it appears under its name only when it is whole.
@@ -37,38 +37,67 @@ pub fn write_atomically(
     partial.publish()
 }
 
-/// `FILE.partial` while it is being written; removed when dropped before it was published.
+/// `FILE.partial` while it is being written; removed when dropped before it was published, unless it is to be kept.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
     path: PathBuf,
     partial: PathBuf,
     writer: Option<BufWriter<File>>,
+    keep: bool,
+}
+
+/// `FILE.partial`.
+pub(crate) fn partial_name(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    PathBuf::from(name)
 }
 
 impl PartialFile {
     pub(crate) fn create(path: &Path) -> Result<Self, GridError> {
-        if path.is_dir() {
-            // Said now, not after an hour when the rename fails.
-            return Err(GridError::io(path)(io::Error::new(
-                io::ErrorKind::IsADirectory,
-                "is a folder; give the name of a file",
-            )));
-        }
-        let mut name = path.as_os_str().to_owned();
-        name.push(".partial");
-        let partial = PathBuf::from(name);
+        refuse_folder(path)?;
+        let partial = partial_name(path);
         let file = File::create(&partial).map_err(GridError::io(path))?;
-        Ok(Self {
+        Ok(Self::new(path, partial, file, false))
+    }
+
+    /// What is there already, or a new one; kept when dropped.
+    pub(crate) fn reopen(path: &Path) -> Result<Self, GridError> {
+        refuse_folder(path)?;
+        let partial = partial_name(path);
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&partial)
+            .map_err(GridError::io(path))?;
+        Ok(Self::new(path, partial, file, true))
+    }
+
+    fn new(path: &Path, partial: PathBuf, file: File, keep: bool) -> Self {
+        Self {
             path: path.to_owned(),
             partial,
             writer: Some(BufWriter::with_capacity(1 << 20, file)),
-        })
+            keep,
+        }
     }
 
     pub(crate) fn writer(&mut self) -> &mut BufWriter<File> {
         self.writer
             .as_mut()
             .expect("the writer is taken only by publish and drop")
+    }
+
+    /// Throws away everything from `length` on and goes on there.
+    pub(crate) fn cut_to(&mut self, length: u64) -> Result<(), GridError> {
+        let path = self.path.clone();
+        let file = self.writer().get_mut();
+        file.set_len(length)
+            .and_then(|()| file.seek(SeekFrom::Start(length)))
+            .map(drop)
+            .map_err(GridError::io(&path))
     }
 
     pub(crate) fn publish(mut self) -> Result<(), GridError> {
@@ -81,12 +110,30 @@ impl PartialFile {
     }
 }
 
+fn refuse_folder(path: &Path) -> Result<(), GridError> {
+    if path.is_dir() {
+        // Said now, not after an hour when the rename fails.
+        return Err(GridError::io(path)(io::Error::new(
+            io::ErrorKind::IsADirectory,
+            "is a folder; give the name of a file",
+        )));
+    }
+    Ok(())
+}
+
 impl Drop for PartialFile {
     fn drop(&mut self) {
-        if let Some(writer) = self.writer.take() {
-            // Close without flushing what is to be thrown away; there is nobody to tell if the removal fails.
-            drop(writer.into_parts());
-            let _ = fs::remove_file(&self.partial);
+        // There is nobody to tell if the flush or the removal fails.
+        match self.writer.take() {
+            Some(mut writer) if self.keep => {
+                let _ = writer.flush();
+            }
+            Some(writer) => {
+                // Closed without flushing what is to be thrown away.
+                drop(writer.into_parts());
+                let _ = fs::remove_file(&self.partial);
+            }
+            None => {}
         }
     }
 }

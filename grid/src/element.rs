@@ -1,9 +1,7 @@
 //! The sample types of our volumes and what each format calls them.
 
-use std::io::{self, Seek, Write};
-use tiff::TiffResult;
-use tiff::encoder::{DirectoryEncoder, TiffKind};
-use tiff::tags::SampleFormat;
+use crate::hdf5::Type;
+use std::io::{self, Write};
 
 /// A sample type of a volume: `u8` (colours, categories), `u32` (ids), `f32` (distances, residuals).
 ///
@@ -15,55 +13,71 @@ impl Element for u32 {}
 impl Element for f32 {}
 
 /// What the formats call a sample type, and its little-endian bytes.
-pub trait Encoded: Copy + Default + Send + Sync + 'static {
+pub trait Encoded: Copy + Default + PartialEq + Send + Sync + 'static {
     /// NumPy's type descriptor.
     const NPY: &'static str;
     /// NRRD's type name.
     const NRRD: &'static str;
     /// VTK's type name.
     const VTK: &'static str;
+    /// Zarr's type name.
+    const ZARR: &'static str;
+    /// TIFF's sample format: 1 unsigned, 3 floating point.
+    const TIFF_SAMPLE: u16;
+    /// Bits of a sample.
+    const BITS: u16;
+    /// The type in HDF5.
+    const HDF5: Type;
+    /// The type in DREAM.3D.
+    const DREAM3D: &'static str;
+    /// What DREAM.3D calls an array of one such sample a cell.
+    const CELLS: &'static str;
     /// Writes the samples as little-endian bytes.
     fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()>;
-    /// TIFF's sample format.
-    const TIFF_SAMPLE: SampleFormat;
-    /// Writes the samples into a TIFF file, in its byte order, and says where they begin.
-    fn write_page<W: Write + Seek, K: TiffKind>(
-        tiff: &mut DirectoryEncoder<'_, W, K>,
-        samples: &[Self],
-    ) -> TiffResult<u64>;
     /// The samples of little-endian bytes; a rest shorter than a sample is left out.
     fn decode(bytes: &[u8]) -> Vec<Self>;
+    /// One sample for several of a finer grid: the mean, rounded.
+    fn mean(samples: &[Self]) -> Self;
 }
 
 impl Encoded for u8 {
     const NPY: &'static str = "|u1";
     const NRRD: &'static str = "uint8";
     const VTK: &'static str = "UInt8";
-    const TIFF_SAMPLE: SampleFormat = SampleFormat::Uint;
+    const ZARR: &'static str = "uint8";
+    const TIFF_SAMPLE: u16 = 1;
+    const BITS: u16 = 8;
+    const HDF5: Type = Type::Unsigned(1);
+    const DREAM3D: &'static str = "uint8_t";
+    const CELLS: &'static str = "values";
 
     fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(samples)
     }
 
-    fn write_page<W: Write + Seek, K: TiffKind>(
-        tiff: &mut DirectoryEncoder<'_, W, K>,
-        samples: &[Self],
-    ) -> TiffResult<u64> {
-        tiff.write_data(samples)
-    }
-
     fn decode(bytes: &[u8]) -> Vec<Self> {
         bytes.to_vec()
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "the mean of bytes is a byte")]
+    fn mean(samples: &[Self]) -> Self {
+        let sum: usize = samples.iter().map(|&sample| usize::from(sample)).sum();
+        ((2 * sum + samples.len()) / (2 * samples.len()).max(1)) as Self
     }
 }
 
 macro_rules! four_bytes {
-    ($type:ty, $npy:literal, $nrrd:literal, $vtk:literal, $tiff:ident) => {
+    ($type:ty, $npy:literal, $nrrd:literal, $vtk:literal, $zarr:literal, $tiff:literal, $hdf5:expr, $dream3d:literal, $cells:literal, $mean:expr) => {
         impl Encoded for $type {
             const NPY: &'static str = $npy;
             const NRRD: &'static str = $nrrd;
             const VTK: &'static str = $vtk;
-            const TIFF_SAMPLE: SampleFormat = SampleFormat::$tiff;
+            const ZARR: &'static str = $zarr;
+            const TIFF_SAMPLE: u16 = $tiff;
+            const BITS: u16 = 32;
+            const HDF5: Type = $hdf5;
+            const DREAM3D: &'static str = $dream3d;
+            const CELLS: &'static str = $cells;
 
             fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()> {
                 let mut bytes = [0; 4 * 1024];
@@ -76,22 +90,42 @@ macro_rules! four_bytes {
                 Ok(())
             }
 
-            fn write_page<W: Write + Seek, K: TiffKind>(
-                tiff: &mut DirectoryEncoder<'_, W, K>,
-                samples: &[Self],
-            ) -> TiffResult<u64> {
-                tiff.write_data(samples)
-            }
-
             fn decode(bytes: &[u8]) -> Vec<Self> {
                 bytes
                     .chunks_exact(4)
                     .map(|b| <$type>::from_le_bytes([b[0], b[1], b[2], b[3]]))
                     .collect()
             }
+
+            fn mean(samples: &[Self]) -> Self {
+                $mean(samples)
+            }
         }
     };
 }
 
-four_bytes!(u32, "<u4", "uint32", "UInt32", Uint);
-four_bytes!(f32, "<f4", "float", "Float32", IEEEFP);
+// DREAM.3D takes ids as i32: the same bytes below 2^31.
+four_bytes!(
+    u32,
+    "<u4",
+    "uint32",
+    "UInt32",
+    "uint32",
+    1,
+    Type::Signed(4),
+    "int32_t",
+    "FeatureIds",
+    |samples: &[u32]| samples.first().copied().unwrap_or_default()
+);
+four_bytes!(
+    f32,
+    "<f4",
+    "float",
+    "Float32",
+    "float32",
+    3,
+    Type::Float32,
+    "float",
+    "values",
+    |samples: &[f32]| samples.iter().sum::<f32>() / samples.len().max(1) as f32
+);

@@ -16,11 +16,17 @@ pub enum GridError {
         /// What the system said.
         source: io::Error,
     },
-    /// The callback broke off; nothing was left on disk.
-    #[error("cancelled; nothing was written")]
+    /// The callback broke off; nothing was left on disk, but the partial volume where it is to be gone on with.
+    #[error("cancelled")]
     Cancelled,
+    /// What lies half-written is the beginning of another volume.
+    #[error("{}: begins another volume than the one asked for; remove it, or do not resume", partial.display())]
+    OtherPartial {
+        /// The half-written file.
+        partial: PathBuf,
+    },
     /// The extension names no format of ours.
-    #[error("{}: unknown format; use .npy, .nrrd, .vti or .tif", path.display())]
+    #[error("{}: unknown format; use .npy, .nrrd, .vti, .tif, .h5 or .zarr", path.display())]
     UnknownFormat {
         /// The path whose extension it was.
         path: PathBuf,

@@ -15,9 +15,16 @@ pub enum Format {
     Vti,
     /// Stack of TIFF pages, uncompressed: `.tif`, `.tiff`.
     Tiff,
+    /// HDF5 in the layout of DREAM.3D: `.h5`, `.hdf5`, `.dream3d`.
+    Hdf5,
+    /// Folder of OME-Zarr 0.5, several resolutions in shards: `.zarr`.
+    Zarr,
 }
 
 impl Format {
+    /// Every format.
+    pub const ALL: [Self; 6] = [Self::Npy, Self::Nrrd, Self::Vti, Self::Tiff, Self::Hdf5, Self::Zarr];
+
     /// The format that the extension names; capitals do not matter.
     ///
     /// # Errors
@@ -40,6 +47,8 @@ impl Format {
             Some("nrrd") => Ok(Self::Nrrd),
             Some("vti") => Ok(Self::Vti),
             Some("tif" | "tiff") => Ok(Self::Tiff),
+            Some("h5" | "hdf5" | "dream3d") => Ok(Self::Hdf5),
+            Some("zarr") => Ok(Self::Zarr),
             _ => Err(GridError::UnknownFormat { path: path.to_owned() }),
         }
     }
@@ -52,6 +61,8 @@ impl fmt::Display for Format {
             Self::Nrrd => ".nrrd",
             Self::Vti => ".vti",
             Self::Tiff => ".tif",
+            Self::Hdf5 => ".h5",
+            Self::Zarr => ".zarr",
         })
     }
 }

@@ -54,18 +54,22 @@
 //! abort the program. So the headers of .npy, .nrrd and .vti are written here, fifteen lines each, and checked with the real readers; TIFF is the crate `tiff`'s.
 
 mod atomic;
+mod dream3d;
 mod element;
 mod error;
 mod format;
+mod frame;
+mod hdf5;
 mod npy;
 mod nrrd;
 mod slabs;
 mod tiff_stack;
 mod vti;
+mod zarr;
 
 pub use atomic::write_atomically;
 pub use element::Element;
 pub use error::GridError;
 pub use format::Format;
 pub use npy::read_npy;
-pub use slabs::{VolumeShape, write_volume};
+pub use slabs::{VolumeShape, resume_volume, write_volume};

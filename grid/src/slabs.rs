@@ -1,10 +1,12 @@
-//! A volume written one z slab at a time.
+//! A volume written one z slab at a time, and gone on with where it was broken off.
 
-use crate::atomic::PartialFile;
+use crate::atomic::{PartialFile, partial_name};
 use crate::element::Element;
-use crate::{Format, GridError, npy, nrrd, tiff_stack, vti};
+use crate::frame::Frame;
+use crate::{Format, GridError, zarr};
 use ndarray::ArrayViewMut3;
-use std::io::{self, Write};
+use std::fs;
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -46,11 +48,12 @@ impl VolumeShape {
 
 /// Writes a volume whose slabs `fill` computes: `fill(z, slab)` is called for z = 0, 1, ..., nz − 1 with a view (y, x, channel) that holds zeros at first and whatever was left in it later.
 ///
-/// `spacing` is the size of a voxel along x, y, z in the unit of length of your choice; .npy has no place for it. Memory: one slab. The file appears under its name when it is whole.
+/// `spacing` is the size of a voxel along x, y, z in the unit of length of your choice; .npy has no place for it. Memory: one slab; for Zarr 32 slabs, and as many of each coarser resolution. The file appears under its name
+/// when it is whole.
 ///
 /// # Errors
 ///
-/// Before anything is written: [`GridError::Empty`], [`GridError::Uncountable`], [`GridError::Channels`] (VTI and TIFF show 1 or 3), [`GridError::Spacing`], [`GridError::NoRoom`] (the file system has fewer bytes free than the file
+/// Before anything is written: [`GridError::Empty`], [`GridError::Uncountable`], [`GridError::Channels`] (VTI, TIFF and Zarr show 1 or 3), [`GridError::Spacing`], [`GridError::NoRoom`] (the file system has fewer bytes free than the file
 /// needs), [`GridError::SlabTooLarge`]. On the way: [`GridError::Cancelled`] if `fill` breaks, [`GridError::Io`]; then nothing is left behind.
 ///
 /// # Examples
@@ -63,7 +66,7 @@ impl VolumeShape {
 /// let folder = tempfile::tempdir()?;
 /// let shape = VolumeShape { nz: 1_000_000, ny: 1_000_000, nx: 1_000_000, channels: 3 };
 /// let refused = write_volume::<u8>(folder.path().join("v.npy"), Format::Npy, shape, [1.0; 3], |_, _| ControlFlow::Continue(()));
-/// assert!(matches!(refused, Err(GridError::NoRoom { needed: 3_000_000_000_000_000_128, .. })));
+/// assert!(matches!(refused, Err(GridError::NoRoom { needed: 3_000_000_000_000_000_000, .. })));
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub fn write_volume<T: Element>(
@@ -71,52 +74,178 @@ pub fn write_volume<T: Element>(
     format: Format,
     shape: VolumeShape,
     spacing: [f64; 3],
-    mut fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
+    fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
 ) -> Result<(), GridError> {
-    let path = path.as_ref();
+    write(path.as_ref(), format, shape, spacing, false, fill)
+}
+
+/// Writes a volume as [`write_volume`] does, goes on from `FILE.partial` if there is one, and leaves it there if the call is broken off or fails.
+///
+/// What is there must be the beginning of the same volume: its head is compared, and its first and its last whole slab with what `fill` gives for them. So `fill` is called for those two, and then for every slab that is missing.
+/// The file is the same as one written at a stretch.
+///
+/// # Errors
+///
+/// As [`write_volume`], and [`GridError::OtherPartial`] if `FILE.partial` is the beginning of another volume.
+///
+/// # Examples
+///
+/// ```
+/// # use std::ops::ControlFlow;
+/// use stereology_grid::{Format, GridError, VolumeShape, resume_volume};
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("ramp.nrrd");
+/// let shape = VolumeShape { nz: 100, ny: 4, nx: 4, channels: 1 };
+/// let write_up_to = |end: usize| {
+///     resume_volume::<f32>(&file, Format::Nrrd, shape, [1.0; 3], |z, mut slab| {
+///         slab.fill(z as f32);
+///         if z < end { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+///     })
+/// };
+/// assert!(matches!(write_up_to(60), Err(GridError::Cancelled)));
+/// assert!(!file.exists());
+/// write_up_to(100)?; // computes slabs 0 and 59 again, and 60 to 99
+/// assert!(file.exists());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn resume_volume<T: Element>(
+    path: impl AsRef<Path>,
+    format: Format,
+    shape: VolumeShape,
+    spacing: [f64; 3],
+    fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
+) -> Result<(), GridError> {
+    write(path.as_ref(), format, shape, spacing, true, fill)
+}
+
+fn write<T: Element>(
+    path: &Path,
+    format: Format,
+    shape: VolumeShape,
+    spacing: [f64; 3],
+    resume: bool,
+    fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
+) -> Result<(), GridError> {
     let [bytes, slab_bytes] = shape.bytes::<T>()?;
-    let VolumeShape { nz, channels, .. } = shape;
-    if matches!(format, Format::Vti | Format::Tiff) && channels != 1 && channels != 3 {
+    let channels = shape.channels;
+    if !matches!(format, Format::Npy | Format::Nrrd | Format::Hdf5) && channels != 1 && channels != 3 {
         return Err(GridError::Channels { format, channels });
     }
     if !spacing.iter().all(|s| s.is_finite() && *s > 0.0) {
         return Err(GridError::Spacing { spacing });
     }
-    let (header, footer) = match format {
-        Format::Npy => (npy::header::<T>(&shape), &b""[..]),
-        Format::Nrrd => (nrrd::header::<T>(&shape, spacing), &b""[..]),
-        Format::Vti => (vti::header::<T>(&shape, spacing, bytes), vti::FOOTER),
-        Format::Tiff => (Vec::new(), &b""[..]),
-    };
-    refuse_without_room(path, bytes.saturating_add((header.len() + footer.len()) as u64))?;
-
-    let mut slab = Vec::new();
-    let samples =
-        usize::try_from(slab_bytes).map_err(|_| GridError::SlabTooLarge { bytes: slab_bytes })? / size_of::<T>();
-    slab.try_reserve_exact(samples)
-        .map_err(|_| GridError::SlabTooLarge { bytes: slab_bytes })?;
-    slab.resize(samples, T::default());
-
-    let mut file = PartialFile::create(path)?;
-    let mut slab_to = |z: usize, write: &mut dyn FnMut(&[T]) -> io::Result<()>| match fill(z, view(&mut slab, &shape)) {
-        ControlFlow::Break(()) => Err(GridError::Cancelled),
-        ControlFlow::Continue(()) => write(&slab).map_err(GridError::io(path)),
-    };
-    let out = file.writer();
-    if format == Format::Tiff {
-        tiff_stack::write(out, path, &shape, spacing, bytes, slab_to)?;
-    } else {
-        out.write_all(&header).map_err(GridError::io(path))?;
-        for z in 0..nz {
-            slab_to(z, &mut |samples| T::write(samples, out))?;
-        }
-        out.write_all(footer).map_err(GridError::io(path))?;
+    let held = if resume { bytes_in(&partial_name(path)) } else { 0 };
+    // Directories of a TIFF's pages are not made for a volume that cannot be: there may be 2^64 of them.
+    refuse_without_room(path, bytes.saturating_sub(held))?;
+    let frame = Frame::of::<T>(format, &shape, spacing, bytes);
+    let around = frame.as_ref().map_or(0, Frame::length);
+    refuse_without_room(path, bytes.saturating_add(around).saturating_sub(held))?;
+    let mut slabs = Slabs::new(shape, slab_bytes, fill)?;
+    match frame {
+        None => zarr::write(path, &shape, spacing, resume, &mut slabs),
+        Some(frame) => write_framed(path, &frame, slab_bytes, resume, &mut slabs),
     }
+}
+
+/// Where slabs come from.
+pub(crate) struct Slabs<T, F> {
+    shape: VolumeShape,
+    slab: Vec<T>,
+    fill: F,
+}
+
+impl<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>> Slabs<T, F> {
+    fn new(shape: VolumeShape, bytes: u64, fill: F) -> Result<Self, GridError> {
+        let samples = usize::try_from(bytes).map_err(|_| GridError::SlabTooLarge { bytes })? / size_of::<T>();
+        let mut slab = Vec::new();
+        slab.try_reserve_exact(samples)
+            .map_err(|_| GridError::SlabTooLarge { bytes })?;
+        slab.resize(samples, T::default());
+        Ok(Self { shape, slab, fill })
+    }
+
+    /// The samples of the slab at z.
+    pub(crate) fn at(&mut self, z: usize) -> Result<&[T], GridError> {
+        let VolumeShape { ny, nx, channels, .. } = self.shape;
+        let view =
+            ArrayViewMut3::from_shape((ny, nx, channels), &mut self.slab).expect("the slab was made for this shape");
+        match (self.fill)(z, view) {
+            ControlFlow::Break(()) => Err(GridError::Cancelled),
+            ControlFlow::Continue(()) => Ok(&self.slab),
+        }
+    }
+}
+
+fn write_framed<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
+    path: &Path,
+    frame: &Frame,
+    slab_bytes: u64,
+    resume: bool,
+    slabs: &mut Slabs<T, F>,
+) -> Result<(), GridError> {
+    let (mut file, done) = if resume {
+        let mut file = PartialFile::reopen(path)?;
+        let done = whole_slabs(path, &mut file, frame, slab_bytes, slabs)?;
+        (file, done)
+    } else {
+        (PartialFile::create(path)?, 0)
+    };
+    let failed = || GridError::io(path);
+    if done == 0 {
+        file.cut_to(0)?;
+        file.writer().write_all(&frame.head).map_err(failed())?;
+    } else {
+        file.cut_to(frame.head.len() as u64 + done as u64 * slab_bytes)?;
+    }
+    for z in done..slabs.shape.nz {
+        T::write(slabs.at(z)?, file.writer()).map_err(failed())?;
+    }
+    file.writer().write_all(&frame.tail).map_err(failed())?;
     file.publish()
 }
 
-fn view<'a, T>(slab: &'a mut [T], shape: &VolumeShape) -> ArrayViewMut3<'a, T> {
-    ArrayViewMut3::from_shape((shape.ny, shape.nx, shape.channels), slab).expect("the slab was made for this shape")
+/// How many slabs of `FILE.partial` are there, the same as ours as far as head, first and last slab tell.
+fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
+    path: &Path,
+    file: &mut PartialFile,
+    frame: &Frame,
+    slab_bytes: u64,
+    slabs: &mut Slabs<T, F>,
+) -> Result<usize, GridError> {
+    let head = frame.head.len() as u64;
+    let length = file.writer().get_ref().metadata().map_err(GridError::io(path))?.len();
+    if length < head + slab_bytes {
+        return Ok(0);
+    }
+    let whole = usize::try_from((length - head) / slab_bytes).unwrap_or(usize::MAX);
+    let done = whole.min(slabs.shape.nz);
+    let mut is_there = |at: u64, ours: &[u8]| {
+        let mut theirs = vec![0; ours.len()];
+        let from = file.writer().get_mut();
+        from.seek(SeekFrom::Start(at))
+            .and_then(|_| from.read_exact(&mut theirs))
+            .map_err(GridError::io(path))?;
+        if theirs == ours {
+            return Ok(());
+        }
+        let partial = partial_name(path);
+        Err(GridError::OtherPartial { partial })
+    };
+    is_there(0, &frame.head)?;
+    for z in [0, done - 1] {
+        let mut ours = Vec::new();
+        T::write(slabs.at(z)?, &mut ours).map_err(GridError::io(path))?;
+        is_there(head + z as u64 * slab_bytes, &ours)?;
+    }
+    Ok(done)
+}
+
+/// Bytes of a file, or of all files in a folder.
+fn bytes_in(path: &Path) -> u64 {
+    match fs::read_dir(path) {
+        Ok(entries) => entries.flatten().map(|entry| bytes_in(&entry.path())).sum(),
+        Err(_) => fs::metadata(path).map_or(0, |file| file.len()),
+    }
 }
 
 /// Refuses a file that its file system cannot hold.

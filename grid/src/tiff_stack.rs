@@ -2,133 +2,165 @@
 //!
 //! ImageJ ignores the directories behind the first of a file that calls itself its stack, and other readers follow it; so the samples must not be interrupted.
 
+use crate::VolumeShape;
 use crate::element::Element;
-use crate::{GridError, VolumeShape};
-use std::io::{self, Seek, Write};
-use std::path::Path;
-use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
-use tiff::tags::{PhotometricInterpretation, ResolutionUnit, Tag};
-use tiff::{TiffError, TiffResult};
 
-/// Writes the slabs that `next(z, write)` hands to `write`, z by z.
-pub(crate) fn write<T: Element, W: Write + Seek>(
-    out: W,
-    path: &Path,
-    shape: &VolumeShape,
-    spacing: [f64; 3],
-    bytes: u64,
-    next: impl FnMut(usize, &mut dyn FnMut(&[T]) -> io::Result<()>) -> Result<(), GridError>,
-) -> Result<(), GridError> {
-    // A page's directory takes some 300 bytes; the offsets of a standard TIFF have 32 bits.
-    if bytes + 1024 * shape.nz as u64 <= u64::from(u32::MAX) {
-        let tiff = TiffEncoder::<W, TiffKindStandard>::new_generic(out);
-        stack(tiff, path, shape, spacing, bytes, next)
+/// What stands before and behind the samples. A standard TIFF, or a BigTIFF where 32-bit offsets do not suffice.
+pub(crate) fn frame<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> (Vec<u8>, Vec<u8>) {
+    // A page's directory takes some 300 bytes.
+    let big = bytes.saturating_add(1024 * shape.nz as u64) > u64::from(u32::MAX);
+    let kind = Kind { big };
+    let start = kind.head_length();
+    let directories = (start + bytes).next_multiple_of(2);
+    let head = if big {
+        [b"II\x2b\0\x08\0\0\0", &directories.to_le_bytes()[..]].concat()
     } else {
-        let tiff = TiffEncoder::<W, TiffKindBig>::new_generic(out);
-        stack(tiff, path, shape, spacing, bytes, next)
-    }
-}
-
-fn stack<T: Element, W: Write + Seek, K: TiffKind>(
-    tiff: TiffResult<TiffEncoder<W, K>>,
-    path: &Path,
-    shape: &VolumeShape,
-    spacing: [f64; 3],
-    bytes: u64,
-    mut next: impl FnMut(usize, &mut dyn FnMut(&[T]) -> io::Result<()>) -> Result<(), GridError>,
-) -> Result<(), GridError> {
-    let failed = |error| GridError::io(path)(unwrapped(error));
-    let mut tiff = tiff.map_err(failed)?;
-    let mut first = tiff.image_directory().map_err(failed)?;
-    let mut offsets = Vec::with_capacity(shape.nz);
-    for z in 0..shape.nz {
-        next(z, &mut |samples| {
-            offsets.push(T::write_page(&mut first, samples).map_err(unwrapped)?);
-            Ok(())
-        })?;
-    }
-    if bytes % 2 == 1 {
-        first.write_data(0_u8).map_err(failed)?; // what follows begins at even places
-    }
-    describe::<T, W, K>(&mut first, shape, spacing, offsets[0]).map_err(failed)?;
-    let mut description = format!(
-        "ImageJ=1.54f\nimages={nz}\nslices={nz}\nspacing={}\nloop=false\n",
-        spacing[2],
-        nz = shape.nz
-    );
-    if description.len() % 2 == 0 {
-        description.push('\n');
-    }
-    first
-        .write_tag(Tag::ImageDescription, description.as_str())
-        .and_then(|()| first.finish())
-        .map_err(failed)?;
-    for &offset in &offsets[1..] {
-        let mut page = tiff.image_directory().map_err(failed)?;
-        describe::<T, W, K>(&mut page, shape, spacing, offset)
-            .and_then(|()| page.finish())
-            .map_err(failed)?;
-    }
-    Ok(())
-}
-
-/// The tags of a page.
-fn describe<T: Element, W: Write + Seek, K: TiffKind>(
-    page: &mut DirectoryEncoder<'_, W, K>,
-    shape: &VolumeShape,
-    spacing: [f64; 3],
-    offset: u64,
-) -> TiffResult<()> {
-    let VolumeShape { ny, nx, channels, .. } = *shape;
-    let (width, height) = (u32::try_from(nx)?, u32::try_from(ny)?);
-    let samples = [(); 3].map(|()| T::TIFF_SAMPLE.to_u16());
-    let bits = [u16::try_from(8 * size_of::<T>())?; 3];
-    let colours = if channels == 1 {
-        PhotometricInterpretation::BlackIsZero
-    } else {
-        PhotometricInterpretation::RGB
+        [b"II\x2a\0", kind.offset(directories).as_slice()].concat()
     };
-    page.write_tag(Tag::ImageWidth, width)?;
-    page.write_tag(Tag::ImageLength, height)?;
-    page.write_tag(Tag::BitsPerSample, &bits[..channels])?;
-    page.write_tag(Tag::Compression, 1_u16)?;
-    page.write_tag(Tag::PhotometricInterpretation, colours.to_u16())?;
-    page.write_tag(Tag::StripOffsets, K::convert_offset(offset)?)?;
-    page.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;
-    page.write_tag(Tag::RowsPerStrip, height)?;
-    page.write_tag(
-        Tag::StripByteCounts,
-        K::convert_offset((nx * ny * channels * size_of::<T>()) as u64)?,
-    )?;
-    page.write_tag(Tag::XResolution, per_unit(spacing[0]))?;
-    page.write_tag(Tag::YResolution, per_unit(spacing[1]))?;
-    page.write_tag(Tag::ResolutionUnit, ResolutionUnit::None.to_u16())?;
-    page.write_tag(Tag::SampleFormat, &samples[..channels])?;
-    Ok(())
+    let mut tail = vec![0; usize::from(directories > start + bytes)];
+    let slab = bytes / shape.nz as u64;
+    for z in 0..shape.nz {
+        let at = directories + (tail.len() as u64 - (directories - start - bytes));
+        let mut page = Directory::default();
+        page.describe::<T>(kind, shape, spacing, start + z as u64 * slab, slab);
+        if z == 0 {
+            page.add(IMAGE_DESCRIPTION, ASCII, description(shape.nz, spacing[2]));
+        }
+        tail.extend(page.written(kind, at, z + 1 == shape.nz));
+    }
+    (head, tail)
 }
 
-/// Pixels per unit of length, to one part in a million where 32-bit fractions allow.
-#[expect(clippy::cast_possible_truncation, reason = "clamped to the range of u32 before")]
-fn per_unit(spacing: f64) -> Rational {
-    let largest = f64::from(u32::MAX);
-    if spacing >= 1.0 {
-        let n = (largest / spacing).floor().clamp(1.0, 1e6);
-        Rational {
-            n: n as u32,
-            d: (n * spacing).round().clamp(1.0, largest) as u32,
+/// What ImageJ reads the number of slices and their distance from.
+fn description(slices: usize, spacing: f64) -> Vec<u8> {
+    format!("ImageJ=1.54f\nimages={slices}\nslices={slices}\nspacing={spacing}\nloop=false\n\0").into_bytes()
+}
+
+const IMAGE_WIDTH: u16 = 256;
+const IMAGE_LENGTH: u16 = 257;
+const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
+const PHOTOMETRIC: u16 = 262;
+const IMAGE_DESCRIPTION: u16 = 270;
+const STRIP_OFFSETS: u16 = 273;
+const SAMPLES_PER_PIXEL: u16 = 277;
+const ROWS_PER_STRIP: u16 = 278;
+const STRIP_BYTE_COUNTS: u16 = 279;
+const X_RESOLUTION: u16 = 282;
+const Y_RESOLUTION: u16 = 283;
+const RESOLUTION_UNIT: u16 = 296;
+const SAMPLE_FORMAT: u16 = 339;
+
+const ASCII: u16 = 2;
+const SHORT: u16 = 3;
+const LONG: u16 = 4;
+const RATIONAL: u16 = 5;
+const LONG8: u16 = 16;
+
+/// Standard TIFF has 32-bit offsets, BigTIFF 64-bit ones.
+#[derive(Clone, Copy, Debug)]
+struct Kind {
+    big: bool,
+}
+
+impl Kind {
+    fn head_length(self) -> u64 {
+        if self.big { 16 } else { 8 }
+    }
+
+    /// A place in the file; those of a standard TIFF were seen to fit.
+    fn offset(self, at: u64) -> Vec<u8> {
+        let mut bytes = at.to_le_bytes().to_vec();
+        bytes.truncate(self.offset_length());
+        bytes
+    }
+
+    fn offset_length(self) -> usize {
+        if self.big { 8 } else { 4 }
+    }
+}
+
+/// The tags of a page and their values.
+#[derive(Debug, Default)]
+struct Directory {
+    entries: Vec<(u16, u16, Vec<u8>)>,
+}
+
+impl Directory {
+    fn add(&mut self, tag: u16, kind: u16, value: Vec<u8>) {
+        self.entries.push((tag, kind, value));
+    }
+
+    fn describe<T: Element>(&mut self, kind: Kind, shape: &VolumeShape, spacing: [f64; 3], at: u64, bytes: u64) {
+        let VolumeShape { ny, nx, channels, .. } = *shape;
+        let short = |value: u16| value.to_le_bytes().to_vec();
+        let each = |value: u16| value.to_le_bytes().repeat(channels);
+        let long = |n: usize| u32::try_from(n).unwrap_or(u32::MAX).to_le_bytes().to_vec();
+        let place = if kind.big { LONG8 } else { LONG };
+        self.add(IMAGE_WIDTH, LONG, long(nx));
+        self.add(IMAGE_LENGTH, LONG, long(ny));
+        self.add(BITS_PER_SAMPLE, SHORT, each(T::BITS));
+        self.add(COMPRESSION, SHORT, short(1));
+        self.add(PHOTOMETRIC, SHORT, short(if channels == 1 { 1 } else { 2 }));
+        self.add(STRIP_OFFSETS, place, kind.offset(at));
+        self.add(SAMPLES_PER_PIXEL, SHORT, short(if channels == 1 { 1 } else { 3 }));
+        self.add(ROWS_PER_STRIP, LONG, long(ny));
+        self.add(STRIP_BYTE_COUNTS, place, kind.offset(bytes));
+        self.add(X_RESOLUTION, RATIONAL, per_unit(spacing[0]));
+        self.add(Y_RESOLUTION, RATIONAL, per_unit(spacing[1]));
+        self.add(RESOLUTION_UNIT, SHORT, short(1));
+        self.add(SAMPLE_FORMAT, SHORT, each(T::TIFF_SAMPLE));
+    }
+
+    /// The directory's bytes at the even place `at`, with the values that do not fit into their entries behind it.
+    fn written(mut self, kind: Kind, at: u64, last: bool) -> Vec<u8> {
+        self.entries.sort_by_key(|entry| entry.0);
+        let room = kind.offset_length();
+        let entry = 4 + 2 * room;
+        let count = self.entries.len() as u64;
+        let mut out = if kind.big {
+            count.to_le_bytes().to_vec()
+        } else {
+            count.to_le_bytes()[..2].to_vec()
+        };
+        let values = at + (out.len() + self.entries.len() * entry + room) as u64;
+        let mut behind = Vec::new();
+        for (tag, type_of, value) in &self.entries {
+            let size = match *type_of {
+                ASCII => 1,
+                SHORT => 2,
+                LONG => 4,
+                _ => 8,
+            };
+            out.extend(tag.to_le_bytes());
+            out.extend(type_of.to_le_bytes());
+            out.extend(kind.offset((value.len() / size) as u64));
+            if value.len() <= room {
+                out.extend(value);
+                out.extend(vec![0; room - value.len()]);
+            } else {
+                out.extend(kind.offset(values + behind.len() as u64));
+                behind.extend(value);
+                behind.resize(behind.len().next_multiple_of(2), 0);
+            }
         }
+        let next = if last { 0 } else { values + behind.len() as u64 };
+        out.extend(kind.offset(next));
+        out.extend(behind);
+        out
+    }
+}
+
+/// Pixels per unit of length as a fraction, to one part in a million where 32 bits allow.
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the range of u32 before")]
+fn per_unit(spacing: f64) -> Vec<u8> {
+    let largest = f64::from(u32::MAX);
+    let (n, d) = if spacing >= 1.0 {
+        let n = (largest / spacing).floor().clamp(1.0, 1e6);
+        (n, (n * spacing).round().clamp(1.0, largest))
     } else {
         let d = (largest * spacing).floor().clamp(1.0, 1e6);
-        Rational {
-            n: (d / spacing).round().clamp(1.0, largest) as u32,
-            d: d as u32,
-        }
-    }
-}
-
-fn unwrapped(error: TiffError) -> io::Error {
-    match error {
-        TiffError::IoError(error) => error,
-        other => io::Error::other(other),
-    }
+        ((d / spacing).round().clamp(1.0, largest), d)
+    };
+    [(n as u32).to_le_bytes(), (d as u32).to_le_bytes()].concat()
 }

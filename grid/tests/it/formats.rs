@@ -48,7 +48,7 @@ proptest! {
     fn raw_formats_hold_the_same_bytes(array in volume()) {
         let folder = tempfile::tempdir().unwrap();
         let samples = array.iter().copied().collect::<Vec<u8>>();
-        for (name, footer) in [("v.npy", ""), ("v.nrrd", ""), ("v.vti", "\n  </AppendedData>\n</VTKFile>\n")] {
+        for (name, footer) in [("v.npy", ""), ("v.nrrd", ""), ("v.h5", ""), ("v.vti", "\n  </AppendedData>\n</VTKFile>\n")] {
             let file = folder.path().join(name);
             write(&file, &array, [1.0; 3]);
             let bytes = fs::read(&file).unwrap();

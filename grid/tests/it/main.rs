@@ -3,4 +3,5 @@
 
 mod damaged;
 mod formats;
+mod resume;
 mod whole_or_nothing;

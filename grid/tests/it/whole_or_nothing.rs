@@ -11,7 +11,8 @@ const SHAPE: VolumeShape = VolumeShape {
     nx: 2,
     channels: 1,
 };
-const FORMATS: [Format; 4] = [Format::Npy, Format::Nrrd, Format::Vti, Format::Tiff];
+/// All that are one file.
+const FORMATS: [Format; 5] = [Format::Npy, Format::Nrrd, Format::Vti, Format::Tiff, Format::Hdf5];
 
 fn zeros(path: &Path, format: Format, shape: VolumeShape, spacing: [f64; 3]) -> Result<(), GridError> {
     write_volume::<u8>(path, format, shape, spacing, |_, _| ControlFlow::Continue(()))
@@ -20,7 +21,7 @@ fn zeros(path: &Path, format: Format, shape: VolumeShape, spacing: [f64; 3]) -> 
 #[test]
 fn the_name_appears_with_the_last_slab() {
     let folder = tempfile::tempdir().unwrap();
-    for format in FORMATS {
+    for format in Format::ALL {
         let file = folder.path().join(format!("v{format}"));
         let partial = folder.path().join(format!("v{format}.partial"));
         write_volume::<u8>(&file, format, SHAPE, [1.0; 3], |_, _| {
@@ -51,6 +52,27 @@ fn a_cancelled_volume_leaves_nothing_and_spares_the_old_one() {
     }
 }
 
+/// A folder is as whole as a file: another Zarr folder gives way to it only when it is finished, and nothing else gives way.
+#[test]
+fn a_folder_appears_whole_or_not_at_all() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("v.zarr");
+    zeros(&path, Format::Zarr, SHAPE, [1.0; 3]).unwrap();
+    let old = fs::read(path.join("zarr.json")).unwrap();
+    let cancelled = write_volume::<u8>(&path, Format::Zarr, SHAPE, [2.0; 3], |_, _| ControlFlow::Break(()));
+    assert!(matches!(cancelled, Err(GridError::Cancelled)));
+    assert_eq!(fs::read(path.join("zarr.json")).unwrap(), old);
+    zeros(&path, Format::Zarr, SHAPE, [2.0; 3]).unwrap();
+    assert_ne!(fs::read(path.join("zarr.json")).unwrap(), old);
+    assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+
+    let thesis = place.path().join("thesis.zarr");
+    fs::create_dir(&thesis).unwrap();
+    fs::write(thesis.join("thesis.tex"), "years of work").unwrap();
+    assert!(zeros(&thesis, Format::Zarr, SHAPE, [1.0; 3]).is_err());
+    assert!(thesis.join("thesis.tex").exists());
+}
+
 #[test]
 fn impossible_volumes_are_refused_before_a_file_is_made() {
     let folder = tempfile::tempdir().unwrap();
@@ -65,7 +87,7 @@ fn impossible_volumes_are_refused_before_a_file_is_made() {
         nx: 1_000_000,
         channels: 3,
     };
-    for format in FORMATS {
+    for format in Format::ALL {
         assert!(matches!(refused(million, format, [1.0; 3]), GridError::NoRoom { .. }));
     }
     let shape = VolumeShape {

@@ -1,0 +1,146 @@
+//! The resolutions of a volume, each half as fine as the one before.
+
+use crate::atomic::write_atomically;
+use crate::element::Element;
+use crate::zarr::shard::Shard;
+use crate::zarr::{CHUNK, CHUNKS, COARSE};
+use crate::{GridError, VolumeShape};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// One resolution, and its slabs that are in no shard yet.
+#[derive(Debug)]
+pub(crate) struct Level<T> {
+    pub(crate) folder: PathBuf,
+    pub(crate) shape: VolumeShape,
+    /// Slabs from a multiple of [`CHUNK`] on.
+    band: Vec<T>,
+    /// Slabs that came.
+    z: usize,
+}
+
+impl<T: Element> Level<T> {
+    /// From the finest to the coarsest.
+    pub(crate) fn all(folder: &Path, finest: &VolumeShape) -> Vec<Self> {
+        let mut shape = *finest;
+        let mut levels = Vec::new();
+        loop {
+            levels.push(Self {
+                folder: folder.join(levels.len().to_string()),
+                shape,
+                band: Vec::new(),
+                z: 0,
+            });
+            if shape.nz.max(shape.ny).max(shape.nx) <= COARSE {
+                return levels;
+            }
+            shape = VolumeShape {
+                nz: shape.nz.div_ceil(2),
+                ny: shape.ny.div_ceil(2),
+                nx: shape.nx.div_ceil(2),
+                ..shape
+            };
+        }
+    }
+
+    /// Chunks along y and x in a shard.
+    pub(crate) fn shards(&self) -> [usize; 2] {
+        [self.shape.ny, self.shape.nx].map(|n| n.div_ceil(CHUNK).min(CHUNKS))
+    }
+
+    fn slab_length(&self) -> usize {
+        self.shape.ny * self.shape.nx * self.shape.channels
+    }
+
+    /// The shards of a band: their place in units of shards, and their file.
+    fn shards_of(&self, band: usize) -> impl Iterator<Item = (Shard, PathBuf)> + '_ {
+        let [sy, sx] = self.shards();
+        let (rows, columns) = (self.shape.ny.div_ceil(sy * CHUNK), self.shape.nx.div_ceil(sx * CHUNK));
+        (0..rows).flat_map(move |y| {
+            (0..columns).map(move |x| {
+                let shard = Shard {
+                    chunks: [sy, sx],
+                    from: [y * sy * CHUNK, x * sx * CHUNK],
+                };
+                (shard, self.folder.join(format!("c/0/{band}/{y}/{x}")))
+            })
+        })
+    }
+
+    /// Slabs from 0 on whose shards are all there.
+    pub(crate) fn whole_slabs(&self) -> usize {
+        let bands = self.shape.nz.div_ceil(CHUNK);
+        let whole = (0..bands).take_while(|&band| self.shards_of(band).all(|(_, file)| file.is_file()));
+        (whole.count() * CHUNK).min(self.shape.nz)
+    }
+
+    /// The slabs of the shards that begin at `z`.
+    pub(crate) fn read_slabs(&self, z: usize) -> Result<Vec<Vec<T>>, GridError> {
+        let depth = CHUNK.min(self.shape.nz - z);
+        let mut slabs = vec![vec![T::default(); self.slab_length()]; depth];
+        for (shard, file) in self.shards_of(z / CHUNK) {
+            let bytes = fs::read(&file).map_err(GridError::io(&file))?;
+            shard
+                .unpack(&bytes, &self.shape, &mut slabs)
+                .ok_or(GridError::OtherPartial { partial: file })?;
+        }
+        Ok(slabs)
+    }
+
+    fn write_band(&self) -> Result<(), GridError> {
+        for (shard, file) in self.shards_of((self.z - 1) / CHUNK) {
+            let parent = file.parent().unwrap_or(&self.folder);
+            fs::create_dir_all(parent).map_err(GridError::io(parent))?;
+            let bytes = shard.packed(&self.band, &self.shape);
+            write_atomically(&file, |out| out.write_all(&bytes))?;
+        }
+        Ok(())
+    }
+
+    /// The last one or two slabs as a slab of the next resolution: means of colours and of distances; of ids and categories, which have no mean, the first.
+    fn halved(&self) -> Vec<T> {
+        let VolumeShape { ny, nx, channels, .. } = self.shape;
+        let length = self.slab_length();
+        let slabs: Vec<&[T]> = self.band.chunks_exact(length).rev().take(2 - self.z % 2).collect();
+        let labels = channels == 1 && T::TIFF_SAMPLE == 1;
+        let mut half = Vec::with_capacity(length.div_ceil(4));
+        let mut samples = Vec::with_capacity(8);
+        for y in (0..ny).step_by(2) {
+            for x in (0..nx).step_by(2) {
+                for c in 0..channels {
+                    samples.clear();
+                    // The slab that came first is the last of the two.
+                    for slab in slabs.iter().rev() {
+                        for v in y..(y + 2).min(ny) {
+                            samples.extend((x..(x + 2).min(nx)).map(|u| slab[(v * nx + u) * channels + c]));
+                        }
+                    }
+                    half.push(if labels { samples[0] } else { T::mean(&samples) });
+                }
+            }
+        }
+        half
+    }
+}
+
+/// Takes the next slab of the finest of `levels`; shards that are full are written if `write`.
+pub(crate) fn push<T: Element>(levels: &mut [Level<T>], slab: &[T], write: bool) -> Result<(), GridError> {
+    let Some((level, coarser)) = levels.split_first_mut() else {
+        return Ok(());
+    };
+    level.band.extend_from_slice(slab);
+    level.z += 1;
+    let last = level.z == level.shape.nz;
+    if !coarser.is_empty() && (level.z % 2 == 0 || last) {
+        // What is coarser is written again: it takes in slabs that were not there when it was broken off.
+        push(coarser, &level.halved(), true)?;
+    }
+    if level.z % CHUNK == 0 || last {
+        if write {
+            level.write_band()?;
+        }
+        level.band.clear();
+    }
+    Ok(())
+}

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use serde_json::Value;
-use stereology::grid::write_atomically;
+use stereology::grid::{Format, write_atomically};
 
 use crate::failure::{Explain, Failure};
 
@@ -34,6 +34,20 @@ pub fn check_file(path: &Path, force: bool) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// As [`check_file`], for a volume, which may be a folder that `force` replaces.
+pub fn check_volume(path: &Path, format: Format, force: bool) -> Result<(), Failure> {
+    if format == Format::Zarr && force && path.join("zarr.json").is_file() {
+        return Ok(());
+    }
+    if format == Format::Zarr && path.exists() {
+        let place = path.display();
+        return Err(Failure::run(format!(
+            "{place} exists; give another name, or --force to replace it if it is a Zarr folder"
+        )));
+    }
+    check_file(path, force)
 }
 
 /// Writes a text file whole or not at all.

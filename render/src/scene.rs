@@ -4,10 +4,7 @@ use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use nalgebra::{Point3, Vector3};
-use stereology_shape::TriangleMesh;
-
-/// Faces that meet at less than this angle are one smooth surface: 35°.
-const SMOOTH_COSINE: f64 = 0.82;
+use stereology_shape::{TriangleMesh, corner_normals};
 
 /// A triangle mesh with what rays ask of it.
 pub(crate) struct Scene {
@@ -74,7 +71,7 @@ impl Scene {
             })
             .collect();
         let bvh = Bvh::build(&mut facets);
-        let normals = smooth_normals(mesh, &corners);
+        let normals = corner_normals(mesh);
         Self { bvh, corners, normals }
     }
 
@@ -195,40 +192,6 @@ fn entry(bounds: &Aabb<f64, 3>, origin: &Point3<f64>, inverse: &Vector3<f64>) ->
     }
     // Rounding must not lose a box that is touched.
     (near <= far * (1.0 + 1e-12)).then_some(near)
-}
-
-/// For each corner of each triangle the mean of the normals about its vertex that nearly agree with its own, weighted by their angles there.
-fn smooth_normals(mesh: &TriangleMesh, corners: &[[Point3<f64>; 3]]) -> Vec<[Vector3<f64>; 3]> {
-    let flat: Vec<Vector3<f64>> = corners
-        .iter()
-        .map(|[a, b, c]| {
-            (b - a)
-                .cross(&(c - a))
-                .try_normalize(0.0)
-                .unwrap_or_else(Vector3::zeros)
-        })
-        .collect();
-    let mut around = vec![Vec::new(); mesh.vertices.len()];
-    for (facet, triangle) in mesh.triangles.iter().enumerate() {
-        for (corner, &vertex) in triangle.iter().enumerate() {
-            let [to, left, right] = [0, 1, 2].map(|i| corners[facet][(corner + i) % 3]);
-            let angle = (left - to).angle(&(right - to));
-            around[vertex as usize].push((facet, angle));
-        }
-    }
-    mesh.triangles
-        .iter()
-        .zip(&flat)
-        .map(|(triangle, own)| {
-            triangle.map(|vertex| {
-                let agree = around[vertex as usize]
-                    .iter()
-                    .filter(|(facet, _)| flat[*facet].dot(own) >= SMOOTH_COSINE);
-                let sum = agree.fold(Vector3::zeros(), |sum, (facet, angle)| sum + *angle * flat[*facet]);
-                sum.try_normalize(1e-12).unwrap_or(*own)
-            })
-        })
-        .collect()
 }
 
 #[cfg(test)]

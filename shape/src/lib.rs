@@ -40,8 +40,12 @@
 
 mod body;
 mod closed_mesh;
+mod coloured_mesh;
+#[cfg(feature = "io")]
+mod coloured_mesh_file;
 mod control_sphere;
 mod convex;
+mod corner_normals;
 mod elliptic;
 mod hull;
 mod inside;
@@ -75,7 +79,11 @@ mod winding;
 
 pub use body::{Body, BodyError, BodyKind};
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};
+pub use coloured_mesh::ColouredMesh;
+#[cfg(feature = "io")]
+pub use coloured_mesh_file::write_coloured_mesh;
 pub use control_sphere::{ControlSphere, ControlSphereError};
+pub use corner_normals::corner_normals;
 pub use hull::{HullError, convex_hull};
 #[cfg(feature = "io")]
 pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};

@@ -1,7 +1,7 @@
 //! Mesh files in and out: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use crate::triangle_mesh::TriangleMesh;
@@ -241,29 +241,42 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> 
 pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), MeshFileError> {
     let path = path.as_ref();
     let format = MeshFormat::from_path(path)?;
+    write_whole(path, |out| {
+        check_indices(mesh)?;
+        match format {
+            MeshFormat::Obj => obj::write(out, mesh),
+            MeshFormat::Stl => stl::write(out, mesh),
+            MeshFormat::Ply => ply::write(out, mesh),
+        }
+    })
+}
+
+/// Writes `FILE.partial` and renames it when it is whole.
+pub(crate) fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), MeshFileError> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".partial");
     let write = || {
-        check_indices(mesh)?;
         let mut out = BufWriter::new(File::create(&partial)?);
-        match format {
-            MeshFormat::Obj => obj::write(&mut out, mesh)?,
-            MeshFormat::Stl => stl::write(&mut out, mesh)?,
-            MeshFormat::Ply => ply::write(&mut out, mesh)?,
-        }
-        out.flush()?;
+        write(&mut out)?;
         out.into_inner()
             .map_err(std::io::IntoInnerError::into_error)?
             .sync_all()?;
         std::fs::rename(&partial, path)
     };
-    write().map_err(|source| MeshFileError::Write {
-        path: path.to_owned(),
-        source,
+    write().map_err(|source| {
+        // There is nobody to tell if the removal fails.
+        let _ = std::fs::remove_file(&partial);
+        MeshFileError::Write {
+            path: path.to_owned(),
+            source,
+        }
     })
 }
 
-fn check_indices(mesh: &TriangleMesh) -> std::io::Result<()> {
+pub(crate) fn check_indices(mesh: &TriangleMesh) -> std::io::Result<()> {
     let vertices = mesh.vertices.len();
     match mesh
         .triangles

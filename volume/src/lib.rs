@@ -56,6 +56,7 @@
 //! A voxel volume as the solid itself: it fixes the resolution, and its sections are made of steps. A tree of particles: the grid of cells is faster for packings, whose particles fill space evenly. Plain trilinear lookup of the
 //! residual: between the voxels of white noise it keeps an eighth of the variance, see [`Lookup`].
 
+mod carve;
 mod cells;
 mod residual;
 mod sections;
@@ -63,6 +64,7 @@ mod slice;
 mod solid;
 mod voxels;
 
+pub use carve::{CarveError, CarveOptions, Carved};
 pub use residual::{Lookup, Residual};
 pub use sections::Axis;
 pub use slice::SlicePlane;

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::str::FromStr;
-use stereology_grid::{Element, Format, GridError, VolumeShape, write_volume};
+use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
 
 /// What a voxel says of the point at its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,30 +171,75 @@ impl Solid {
         channel: Channel,
         progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
     ) -> Result<(), GridError> {
-        let grid = self.voxel_grid(along_longest);
-        let path = path.as_ref();
-        match channel {
-            Channel::Rgb => self.write(path, format, &grid, 3, progress, Self::fill_rgb),
-            Channel::Id => self.write(path, format, &grid, 1, progress, Self::fill_ids),
-            Channel::Category => self.write(path, format, &grid, 1, progress, Self::fill_categories),
-            Channel::Distance => self.write(path, format, &grid, 1, progress, Self::fill_distances),
-        }
+        self.write(path.as_ref(), format, along_longest, channel, false, progress)
     }
 
-    fn write<T: Element>(
+    /// Writes the same file as [`Self::write_voxels`], goes on from `FILE.partial` if there is one, and leaves it there if it is broken off: see [`resume_volume`].
+    ///
+    /// # Errors
+    ///
+    /// [`GridError`]; [`GridError::OtherPartial`] if `FILE.partial` is the beginning of another solid or channel.
+    pub fn resume_voxels(
+        &self,
+        path: impl AsRef<Path>,
+        format: Format,
+        along_longest: usize,
+        channel: Channel,
+        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    ) -> Result<(), GridError> {
+        self.write(path.as_ref(), format, along_longest, channel, true, progress)
+    }
+
+    fn write(
         &self,
         path: &Path,
         format: Format,
-        grid: &VoxelGrid,
-        channels: usize,
+        along_longest: usize,
+        channel: Channel,
+        resume: bool,
         progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
-        fill: impl Fn(&Self, &VoxelGrid, usize, ArrayViewMut3<'_, T>),
     ) -> Result<(), GridError> {
-        let shape = grid.shape(channels);
-        write_volume(path, format, shape, grid.spacing, |z, slab| {
-            fill(self, grid, z, slab);
-            progress((z + 1) as f64 / shape.nz as f64)
-        })
+        let file = VoxelFile {
+            path,
+            format,
+            grid: self.voxel_grid(along_longest),
+            resume,
+            progress,
+        };
+        match channel {
+            Channel::Rgb => file.write(3, |grid, z, slab| self.fill_rgb(grid, z, slab)),
+            Channel::Id => file.write(1, |grid, z, slab| self.fill_ids(grid, z, slab)),
+            Channel::Category => file.write(1, |grid, z, slab| self.fill_categories(grid, z, slab)),
+            Channel::Distance => file.write(1, |grid, z, slab| self.fill_distances(grid, z, slab)),
+        }
+    }
+}
+
+/// A file of voxels to be written.
+struct VoxelFile<'a> {
+    path: &'a Path,
+    format: Format,
+    grid: VoxelGrid,
+    resume: bool,
+    progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+}
+
+impl VoxelFile<'_> {
+    fn write<T: Element>(
+        &self,
+        channels: usize,
+        fill: impl Fn(&VoxelGrid, usize, ArrayViewMut3<'_, T>),
+    ) -> Result<(), GridError> {
+        let shape = self.grid.shape(channels);
+        let slab = |z: usize, slab: ArrayViewMut3<'_, T>| {
+            fill(&self.grid, z, slab);
+            (self.progress)((z + 1) as f64 / shape.nz as f64)
+        };
+        if self.resume {
+            resume_volume(self.path, self.format, shape, self.grid.spacing, slab)
+        } else {
+            write_volume(self.path, self.format, shape, self.grid.spacing, slab)
+        }
     }
 }
 

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use stereology::grid::Format;
 use stereology::volume;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::commands::slice::open_solid;
-use crate::commands::texture::volume_format;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_file;
+use crate::outputs::check_volume;
 use crate::progress::Step;
 use crate::values::count;
 
@@ -21,7 +21,10 @@ use crate::values::count;
 /// 0 = binder), distance (signed distance to the nearest particle surface, f32, negative inside). All formats hold the same values of the same voxels; axes
 /// are (z, y, x, channel).
 ///
-/// The file is written plane by plane, whatever its size; if it is killed FILE.partial stays.
+/// .h5 is a DREAM.3D file (ids as FeatureIds), .zarr a folder of OME-Zarr 0.5 with axes (c, z, y, x), several resolutions in shards of 32 planes.
+///
+/// The file is written plane by plane, whatever its size. With --resume it goes on from FILE.partial if there is one, and FILE.partial stays if it is stopped:
+/// give the same command until it is done.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology export out --voxels 256 --channel rgb -o solid.nrrd")]
 pub struct Export {
@@ -34,10 +37,10 @@ pub struct Export {
     /// What to write
     #[arg(long, value_enum, default_value_t = Channel::Rgb)]
     pub channel: Channel,
-    /// Go on from FILE.partial (not available yet)
+    /// Go on from FILE.partial, and keep it when stopped
     #[arg(long)]
     pub resume: bool,
-    /// File: .npy, .nrrd, .vti or .tif (.h5 and .zarr: not available yet)
+    /// File: .npy, .nrrd, .vti, .tif, .h5 or .zarr
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 }
@@ -57,11 +60,8 @@ pub enum Channel {
 
 impl Export {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        if self.resume {
-            return Err(Failure::not_available("--resume"));
-        }
-        let format = volume_format(&self.output)?;
-        check_file(&self.output, everywhere.force)?;
+        let format = Format::from_path(&self.output).or_usage("-o")?;
+        check_volume(&self.output, format, everywhere.force)?;
         let solid = open_solid(&self.solid)?.solid;
         let (channel, name) = match self.channel {
             Channel::Rgb => (volume::Channel::Rgb, "rgb"),
@@ -70,9 +70,13 @@ impl Export {
             Channel::Distance => (volume::Channel::Distance, "distance"),
         };
         let step = Step::begin("voxels", everywhere.quiet);
-        solid
-            .write_voxels(&self.output, format, self.voxels, channel, &|done| step.at(done))
-            .at(&self.output)?;
+        let progress = |done: f64| step.at(done);
+        if self.resume {
+            solid.resume_voxels(&self.output, format, self.voxels, channel, &progress)
+        } else {
+            solid.write_voxels(&self.output, format, self.voxels, channel, &progress)
+        }
+        .at(&self.output)?;
         drop(step);
         let grid = solid.voxel_grid(self.voxels);
         let [nx, ny, nz] = grid.counts;

@@ -1,5 +1,6 @@
 //! The commands, one module each.
 
+pub mod carve;
 pub mod export;
 pub mod kmatrix;
 pub mod pack;
@@ -30,7 +31,7 @@ section, so a sphere's size is its diameter.
 - SHAPE is `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`, `rock:SEED`, or a mesh file (`.obj`, `.stl`, \
 `.ply`); or anything else that `stereology shape` takes as SPEC. `SHAPE=FRACTION` gives the share of the particles of that shape. Only proportions matter to unfolding and packing.
 - Arrays are u8 with axes (z, y, x, channel) in C order: `.npy` as is; `.nrrd` with sizes `3 nx ny nz`; `.vti` with one array `rgb` of three components, x \
-fastest; `.tif` with one RGB page a z.
+fastest; `.tif` with one RGB page a z; `.h5` in the layout of DREAM.3D; `.zarr` is OME-Zarr 0.5, axes (channel, z, y, x).
 - `--json` prints one object whose first key is `schema`, `stereology.<command>/1`, and which has `warnings`, a list of `{code, message}` (codes below).
 - Colours are averaged as stored (sRGB-encoded values / 255), as in the paper.";
 
@@ -48,8 +49,7 @@ pub enum Command {
     Slice(slice::Slice),
     Render(render::Render),
     Export(export::Export),
-    /// Not available yet: a mesh with the solid's texture as vertex colours
-    Carve(Later),
+    Carve(carve::Carve),
     /// Not available yet: measures of a finished solid
     Measure(Later),
     /// Not available yet: a solid from one picture without particles
@@ -93,7 +93,7 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Slice(options) => options.run(everywhere).map(Some),
         Command::Render(options) => options.run(everywhere).map(Some),
         Command::Export(options) => options.run(everywhere).map(Some),
-        Command::Carve(rest) => later("carve", rest),
+        Command::Carve(options) => options.run(everywhere).map(Some),
         Command::Measure(rest) => later("measure", rest),
         Command::Exemplar(rest) => later("exemplar", rest),
         Command::Grow(rest) => later("grow", rest),

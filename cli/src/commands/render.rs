@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use stereology::render::{BlockOptions, Camera, RenderOptions, render_block, render_mesh_with_progress};
 use stereology::shape::{TriangleMesh, read_mesh};
 use stereology::volume::Solid;
@@ -55,7 +55,9 @@ impl Render {
                 render_block(&|p| solid.colour_at(p), solid.period().sides(), &options).or_fail()?
             }
             Some(path) => {
-                let mesh = placed(read_mesh(path).at(path)?, &solid);
+                let mut mesh = read_mesh(path).at(path)?;
+                let placement = Placement::of(&mesh, &solid, None);
+                mesh.vertices.iter_mut().for_each(|v| *v = placement.apply(v));
                 let towards = self.camera.unwrap_or(Triple([1.0, -1.6, 0.8])).0;
                 let camera = camera(
                     Camera {
@@ -86,23 +88,37 @@ impl Render {
     }
 }
 
-/// The mesh with its longest side on one period of the solid, from the origin.
-fn placed(mut mesh: TriangleMesh, solid: &Solid) -> TriangleMesh {
-    let low = mesh
-        .vertices
-        .iter()
-        .fold(Vector3::repeat(f64::INFINITY), |low, v| low.inf(&v.coords));
-    let high = mesh
-        .vertices
-        .iter()
-        .fold(Vector3::repeat(f64::NEG_INFINITY), |high, v| high.sup(&v.coords));
-    let scale = solid.period().sides().max() / (high - low).max();
-    if scale.is_finite() && scale > 0.0 {
-        mesh.vertices
-            .iter_mut()
-            .for_each(|v| v.coords = (v.coords - low) * scale);
+/// Where a mesh lies in the solid.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    from: Vector3<f64>,
+    scale: f64,
+}
+
+impl Placement {
+    /// From the origin on, one period of the solid as long as `period` of the mesh: its longest side if not given.
+    pub fn of(mesh: &TriangleMesh, solid: &Solid, period: Option<f64>) -> Self {
+        let fold = |start: f64, further: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
+            let vertices = mesh.vertices.iter();
+            vertices.fold(Vector3::repeat(start), |far, v| further(&far, &v.coords))
+        };
+        let (low, high) = (fold(f64::INFINITY, Vector3::inf), fold(f64::NEG_INFINITY, Vector3::sup));
+        let scale = solid.period().sides().max() / period.unwrap_or_else(|| (high - low).max());
+        // A mesh without size stays where it is, to be refused by who looks at its triangles.
+        if scale.is_finite() && scale > 0.0 {
+            Self { from: low, scale }
+        } else {
+            Self {
+                from: Vector3::zeros(),
+                scale: 1.0,
+            }
+        }
     }
-    mesh
+
+    /// Where in the solid a point of the mesh is.
+    pub fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
+        Point3::from((p.coords - self.from) * self.scale)
+    }
 }
 
 /// The camera in the direction `towards`, z up.

@@ -203,24 +203,14 @@ impl Texture {
         match (&self.size.0[..], is_picture) {
             (&[n], true) => Ok(Target::Picture([n, n])),
             (&[height, width], true) => Ok(Target::Picture([height, width])),
-            (&[n], false) => Ok(Target::Volume([n; 3], volume_format(&self.output)?)),
-            (&[nz, ny, nx], false) => Ok(Target::Volume([nz, ny, nx], volume_format(&self.output)?)),
+            (&[n], false) => Ok(Target::Volume([n; 3], Format::from_path(&self.output).or_usage("-o")?)),
+            (&[nz, ny, nx], false) => Ok(Target::Volume(
+                [nz, ny, nx],
+                Format::from_path(&self.output).or_usage("-o")?,
+            )),
             (&[_, _], false) => wrong("H,W makes a picture, so the file must end in .png"),
-            _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti or .tif"),
+            _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),
         }
-    }
-}
-
-/// The format of a volume by the file's ending.
-pub fn volume_format(path: &Path) -> Result<Format, Failure> {
-    let ending = path
-        .extension()
-        .and_then(|extension| extension.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
-    match ending.as_str() {
-        "h5" | "hdf5" | "zarr" => Err(Failure::not_available(format!("the format .{ending}"))),
-        _ => Format::from_path(path).or_usage("-o"),
     }
 }
 

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a failing test panics")]
 
 mod bad_input;
+mod carve;
 mod colours;
 mod points;
 mod sections;

@@ -7,7 +7,7 @@
 
 use crate::Solid;
 use crate::solid::{add, to_bytes};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use ndarray::ArrayViewMut3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -58,6 +58,8 @@ pub struct VoxelGrid {
     pub counts: [usize; 3],
     /// Edges of a voxel along x, y, z: side / count, so they may differ a little where the box is not cubic.
     pub spacing: [f64; 3],
+    /// A colour is the mean over this many points along each axis of its voxel (a box filter); 1: the colour of its centre.
+    pub samples: usize,
 }
 
 impl VoxelGrid {
@@ -103,19 +105,37 @@ impl Solid {
         VoxelGrid {
             counts,
             spacing: [0, 1, 2].map(|k| sides[k] / counts[k] as f64),
+            samples: 1,
         }
     }
 
     /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, rows shared among threads.
+    ///
+    /// The colour of a voxel is the mean over `grid.samples`³ points spread evenly in it; 4³ leave steps of 1/64 at the borders of particles.
     pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        fill(grid, z, slab, |p| {
-            let id = self.id_within(p);
-            let mut colour = self.mean_colour(id);
-            if self.residual_voxel().is_some() {
-                colour = add(colour, self.residual_within(p, id.is_some()));
+        let n = grid.samples.max(1);
+        let along = |i: usize, axis: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * grid.spacing[axis];
+        let offsets: Vec<Vector3<f64>> = (0..n.pow(3))
+            .map(|i| Vector3::new(along(i % n, 0), along(i / n % n, 1), along(i / n / n, 2)))
+            .collect();
+        let share = 1.0 / offsets.len() as f32;
+        fill(grid, z, slab, |centre| {
+            let mut colour = [0.0; 3];
+            for offset in &offsets {
+                colour = add(colour, self.colour_within(&(centre + offset)));
             }
-            to_bytes(colour)
+            to_bytes(colour.map(|c| c * share))
         });
+    }
+
+    /// Colour at a point of the box.
+    fn colour_within(&self, p: &Point3<f64>) -> [f32; 3] {
+        let id = self.id_within(p);
+        let mean = self.mean_colour(id);
+        match self.residual_voxel() {
+            None => mean,
+            Some(_) => add(mean, self.residual_within(p, id.is_some())),
+        }
     }
 
     /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
@@ -135,7 +155,7 @@ impl Solid {
         fill(grid, z, slab, |p| [self.distance_at(p) as f32]);
     }
 
-    /// Writes one period of the solid, `along_longest` voxels along its longest side, as a file of any format; all formats hold the same bytes, at any number of threads.
+    /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
     ///
     /// `progress` is told the share that is done and may break off. Memory beside the solid: one slab.
     ///
@@ -157,7 +177,7 @@ impl Solid {
     /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
     /// # let folder = tempfile::tempdir()?;
     /// let file = folder.path().join("ids.npy");
-    /// solid.write_voxels(&file, Format::Npy, 64, Channel::Id, &|_| ControlFlow::Continue(()))?;
+    /// solid.write_voxels(&file, Format::Npy, &solid.voxel_grid(64), Channel::Id, &|_| ControlFlow::Continue(()))?;
     /// let inside = read_npy::<u32>(&file)?.iter().filter(|id| **id == 1).count();
     /// let fraction = inside as f64 / 64_f64.powi(3);
     /// assert!((fraction / (std::f64::consts::PI * 36.0 / 1000.0) - 1.0).abs() < 1e-2); // π d³ / 6 over the box
@@ -167,11 +187,11 @@ impl Solid {
         &self,
         path: impl AsRef<Path>,
         format: Format,
-        along_longest: usize,
+        grid: &VoxelGrid,
         channel: Channel,
         progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
     ) -> Result<(), GridError> {
-        self.write(path.as_ref(), format, along_longest, channel, false, progress)
+        self.write(path.as_ref(), format, grid, channel, false, progress)
     }
 
     /// Writes the same file as [`Self::write_voxels`], goes on from `FILE.partial` if there is one, and leaves it there if it is broken off: see [`resume_volume`].
@@ -183,18 +203,18 @@ impl Solid {
         &self,
         path: impl AsRef<Path>,
         format: Format,
-        along_longest: usize,
+        grid: &VoxelGrid,
         channel: Channel,
         progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
     ) -> Result<(), GridError> {
-        self.write(path.as_ref(), format, along_longest, channel, true, progress)
+        self.write(path.as_ref(), format, grid, channel, true, progress)
     }
 
     fn write(
         &self,
         path: &Path,
         format: Format,
-        along_longest: usize,
+        grid: &VoxelGrid,
         channel: Channel,
         resume: bool,
         progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
@@ -202,7 +222,7 @@ impl Solid {
         let file = VoxelFile {
             path,
             format,
-            grid: self.voxel_grid(along_longest),
+            grid,
             resume,
             progress,
         };
@@ -219,7 +239,7 @@ impl Solid {
 struct VoxelFile<'a> {
     path: &'a Path,
     format: Format,
-    grid: VoxelGrid,
+    grid: &'a VoxelGrid,
     resume: bool,
     progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
 }
@@ -232,7 +252,7 @@ impl VoxelFile<'_> {
     ) -> Result<(), GridError> {
         let shape = self.grid.shape(channels);
         let slab = |z: usize, slab: ArrayViewMut3<'_, T>| {
-            fill(&self.grid, z, slab);
+            fill(self.grid, z, slab);
             (self.progress)((z + 1) as f64 / shape.nz as f64)
         };
         if self.resume {

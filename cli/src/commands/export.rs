@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use stereology::grid::Format;
-use stereology::volume;
+use stereology::volume::{self, VoxelGrid};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -34,6 +34,9 @@ pub struct Export {
     /// Voxels along the box's longest side
     #[arg(long, value_name = "N", value_parser = count)]
     pub voxels: usize,
+    /// Points along each axis of a voxel whose mean is its colour: 1 for the colour of its centre, 4 for smooth borders
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = samples)]
+    pub samples: usize,
     /// What to write
     #[arg(long, value_enum, default_value_t = Channel::Rgb)]
     pub channel: Channel,
@@ -58,6 +61,13 @@ pub enum Channel {
     Distance,
 }
 
+fn samples(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|n| (1..=16).contains(n))
+        .ok_or_else(|| "a number of points from 1 to 16 is needed".to_owned())
+}
+
 impl Export {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let format = Format::from_path(&self.output).or_usage("-o")?;
@@ -71,14 +81,17 @@ impl Export {
         };
         let step = Step::begin("voxels", everywhere.quiet);
         let progress = |done: f64| step.at(done);
+        let grid = VoxelGrid {
+            samples: self.samples,
+            ..solid.voxel_grid(self.voxels)
+        };
         if self.resume {
-            solid.resume_voxels(&self.output, format, self.voxels, channel, &progress)
+            solid.resume_voxels(&self.output, format, &grid, channel, &progress)
         } else {
-            solid.write_voxels(&self.output, format, self.voxels, channel, &progress)
+            solid.write_voxels(&self.output, format, &grid, channel, &progress)
         }
         .at(&self.output)?;
         drop(step);
-        let grid = solid.voxel_grid(self.voxels);
         let [nx, ny, nz] = grid.counts;
         let mut answer = Answer::new("export");
         answer

@@ -341,7 +341,7 @@ impl Synthesize {
             .write_voxels(
                 folder.file("volume.npy"),
                 Format::Npy,
-                self.solid.voxels,
+                &solid.voxel_grid(self.solid.voxels),
                 Channel::Rgb,
                 &|done| stages.at("voxels", done),
             )

@@ -1,12 +1,14 @@
 //! Voxels: volumes and slabs of spheres within the bounds of discretisation, channels that agree, the same bytes at any number of threads.
 
 use crate::spheres::{mixture, spheres};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::{Array3, Axis as ArrayAxis};
 use std::f64::consts::PI;
 use std::fs;
 use std::ops::ControlFlow;
 use stereology_grid::{Format, GridError, read_npy};
-use stereology_volume::{Axis, Channel, SlicePlane, Solid};
+use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+use stereology_volume::{Axis, Channel, SlicePlane, Solid, VoxelGrid};
 
 fn ids(solid: &Solid, n: usize) -> Array3<u32> {
     let grid = solid.voxel_grid(n);
@@ -80,9 +82,13 @@ fn channels_agree_in_files() {
     let write = |name: &str| {
         let file = folder.path().join(format!("{name}.npy"));
         solid
-            .write_voxels(&file, Format::Npy, 32, name.parse().unwrap(), &|_| {
-                ControlFlow::Continue(())
-            })
+            .write_voxels(
+                &file,
+                Format::Npy,
+                &solid.voxel_grid(32),
+                name.parse().unwrap(),
+                &|_| ControlFlow::Continue(()),
+            )
             .unwrap();
         file
     };
@@ -117,7 +123,9 @@ fn bytes_do_not_depend_on_threads() {
         pool.install(|| {
             let file = folder.path().join("v.nrrd");
             solid
-                .write_voxels(&file, Format::Nrrd, 40, Channel::Rgb, &|_| ControlFlow::Continue(()))
+                .write_voxels(&file, Format::Nrrd, &solid.voxel_grid(40), Channel::Rgb, &|_| {
+                    ControlFlow::Continue(())
+                })
                 .unwrap();
             let slice = solid.slice(&SlicePlane::across(Axis::Y, 1.0), 70, 90, 0.1).unwrap();
             (fs::read(file).unwrap(), slice)
@@ -137,7 +145,38 @@ fn cancelling_leaves_nothing() {
         }
     };
     let file = folder.path().join("v.tif");
-    let cancelled = spheres(0).write_voxels(file, Format::Tiff, 16, Channel::Id, &stop);
+    let solid = spheres(0);
+    let cancelled = solid.write_voxels(file, Format::Tiff, &solid.voxel_grid(16), Channel::Id, &stop);
     assert!(matches!(cancelled, Err(GridError::Cancelled)));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// The box filter keeps the mean colour whatever the resolution: that of a sphere's share of the box, to the steps of its points.
+#[test]
+fn a_filtered_volume_has_the_solids_mean_colour() {
+    let particle = Particle {
+        shape: 0,
+        size: 6.0,
+        category: 0,
+        position: Point3::new(4.1, 5.2, 6.3),
+        orientation: UnitQuaternion::identity(),
+    };
+    let period = PeriodicBox::new(Vector3::repeat(10.0)).unwrap();
+    let sphere = UnitBody::new(&Body::sphere(1.0).unwrap());
+    let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0; 3]], period, [0.0; 3], None).unwrap();
+    let share = PI * 36.0 / 1000.0;
+    for (voxels, samples) in [(4, 16), (8, 8), (16, 4)] {
+        let grid = VoxelGrid {
+            samples,
+            ..solid.voxel_grid(voxels)
+        };
+        let mut sum = 0.0;
+        for z in 0..voxels {
+            let mut slab = Array3::zeros((voxels, voxels, 3));
+            solid.fill_rgb(&grid, z, slab.view_mut());
+            sum += slab.iter().map(|&v: &u8| f64::from(v) / 255.0).sum::<f64>();
+        }
+        let mean = sum / (3.0 * (voxels as f64).powi(3));
+        assert!((mean / share - 1.0).abs() < 0.01, "{voxels}: {mean} {share}");
+    }
 }

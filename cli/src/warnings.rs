@@ -26,6 +26,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Save the labels with more bits (u16 or u32) and import them again.",
     ),
     (
+        "coarse-texture",
+        "A carved mesh has fewer triangles than the texture asks for: it looks blurred where its edges are long.",
+        "More --triangles, or a larger --period so that the texture is coarser on the mesh.",
+    ),
+    (
         "constant-exemplar",
         "The picture whose texture was asked for has one colour where it counts: there is no texture.",
         "Nothing, if the material is that smooth; otherwise look at the picture.",

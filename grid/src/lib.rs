@@ -1,4 +1,4 @@
-//! Arrays in files: NumPy, NRRD, VTK image data, TIFF stacks; written slab by slab and renamed when whole.
+//! Arrays in files: NumPy, NRRD, VTK image data, TIFF stacks, HDF5, OME-Zarr; written slab by slab and renamed when whole.
 //!
 //! A solid of 2048³ voxels does not fit in memory and takes an hour to compute. [`write_volume`] asks for one z slab at a time, so memory holds one slab whatever the number of slabs, and writes to
 //! `FILE.partial`, which becomes `FILE` when the last slab is in: a reader never sees half a volume, and an error or a cancelled call leaves nothing behind. [`write_atomically`] gives the same promise to any
@@ -12,6 +12,8 @@
 //! | [`Format::Nrrd`] | sizes `channels nx ny nz`, or `nx ny nz`; voxel centres at (i + ½) spacing | 3D Slicer, pynrrd, ITK |
 //! | [`Format::Vti`] | one cell array, `rgb` for 3 channels, else `values`; the grid spans nx, ny, nz cells from the origin | ParaView, VTK |
 //! | [`Format::Tiff`] | a page a z, with ImageJ's spacing; BigTIFF where 4 GB do not suffice | ImageJ, Fiji, tifffile |
+//! | [`Format::Hdf5`] | DREAM.3D's image geometry with one cell array (nz, ny, nx, channels): `rgb`, `FeatureIds` of `u32` (as i32: below 2³¹), else `values` | DREAM.3D, h5py |
+//! | [`Format::Zarr`] | OME-Zarr 0.5, arrays (channel, z, y, x) of halved resolutions, 32³ chunks in shards; colours and distances are means, ids and categories are thinned out | napari, zarr-python |
 //!
 //! Voxels are cells, not points: voxel (i, j, k) covers [i, i+1] × [j, j+1] × [k, k+1] times the spacing. In VTK that is cell data, so ids are never interpolated between particles.
 //!
@@ -51,7 +53,9 @@
 //! # What was rejected
 //!
 //! `vtkio` keeps the spacing as f32; `ndarray-npy` needs the whole array in memory to write it, and asks for the memory a header promises before it looks whether the file holds the data: 60 bytes of a damaged file
-//! abort the program. So the headers of .npy, .nrrd and .vti are written here, fifteen lines each, and checked with the real readers; TIFF is the crate `tiff`'s.
+//! abort the program. The HDF5 and Zarr libraries want the whole
+//! array in memory, or a C compiler. So every format is written here, as what stands before the samples and what behind them, which also lets a volume that was broken off be gone on with ([`resume_volume`]); all are checked
+//! with the real readers.
 
 mod atomic;
 mod dream3d;

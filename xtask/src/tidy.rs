@@ -12,8 +12,8 @@ use serde_json::Value;
 const FLOOR: [&str; 3] = ["stereology-shape", "stereology-grid", "stereology-spectrum"];
 /// Crates that may know several rooms.
 const ROOF: [&str; 3] = ["stereology", "stereology-cli", "xtask"];
-/// Folders of the roof that are programs: they may print and look at the clock.
-const PROGRAMS: [&str; 2] = ["cli", "xtask"];
+/// Folders that are programs (fuzz stands outside the workspace): they may print and look at the clock.
+const PROGRAMS: [&str; 3] = ["cli", "xtask", "fuzz"];
 /// Names that say nothing of what a module is about.
 const EMPTY_NAMES: [&str; 7] = ["util", "utils", "common", "helper", "helpers", "types", "misc"];
 /// Packages that end in -sys and hold Rust only.

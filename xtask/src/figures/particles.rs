@@ -22,14 +22,23 @@ pub fn draw_matrix(folder: &Path) -> Result<()> {
     let law = SectionLaw::of_body(&ball, &SectionOptions::default().with_bins(BINS).with_tolerance(2e-4))?;
     let column = |matrix: &nalgebra::DMatrix<f64>, j: usize| matrix.column(j).iter().copied().collect::<Vec<f64>>();
     let (swept, errors) = (law.k_matrix(BINS), law.k_standard_errors(BINS));
-    let columns: Vec<[Vec<f64>; 3]> = (0..BINS)
-        .map(|j| [column(&exact, j), column(&swept, j), column(&errors, j)])
+    type Column = (Vec<f64>, Vec<f64>, Vec<(f64, f64)>);
+    let columns: Vec<Column> = (0..BINS)
+        .map(|j| {
+            let whisker = |i: usize| {
+                (
+                    (swept[(i, j)] - errors[(i, j)]).max(0.0),
+                    swept[(i, j)] + errors[(i, j)],
+                )
+            };
+            (column(&exact, j), column(&swept, j), (0..BINS).map(whisker).collect())
+        })
         .collect();
     let titles: Vec<String> = (1..=BINS).map(|j| format!("spheres of diameter {j}/{BINS}")).collect();
     let panels: Vec<Panel<'_>> = columns
         .iter()
         .zip(&titles)
-        .map(|([exact, swept, errors], title)| Panel {
+        .map(|((exact, swept, whiskers), title)| Panel {
             title,
             across: "profile diameter",
             up: "K",
@@ -43,7 +52,7 @@ pub fn draw_matrix(folder: &Path) -> Result<()> {
                 Series {
                     name: "sweep of 5,120 triangles",
                     values: swept,
-                    errors: Some(errors),
+                    errors: Some(whiskers),
                     colour: RED,
                 },
             ],

@@ -461,9 +461,8 @@ fn next_count(count: usize, growth: f64) -> usize {
 /// F at the nodes: the ratio of sums over all rotations.
 ///
 /// Not the mean of the ratios of single rotations: with few directions each, the mean length of offsets of one rotation goes with what it
-/// shows, and the mean of the ratios is off by more than its own standard error (0.0065 for a box of 1 : 1 : 2 at 0.5 %). The ratio of
-/// the sums is off by the product of two standard errors only. How far each rotation is from it is told to first order:
-/// F + (below − F whole) / mean whole.
+/// shows, a bias that no number of rotations removes. The ratio of the sums is off by the product of two standard errors only. How far each
+/// rotation is from it is told to first order: F + (below − F whole) / mean whole.
 struct Shares {
     mean: Vec<f64>,
     whole: f64,

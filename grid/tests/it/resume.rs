@@ -55,7 +55,7 @@ proptest! {
         for format in Format::ALL {
             let place = tempfile::tempdir().unwrap();
             let path = place.path().join(format!("v{format}"));
-            let sample = |i: usize| (i * 2_654_435_761 >> 7) as u8;
+            let sample = |i: usize| ((i * 2_654_435_761) >> 7).to_le_bytes()[0];
             write(&path, shape, nz, sample).0.unwrap();
             let whole = contents(&path);
 

@@ -128,12 +128,44 @@ fn a_small_photograph_becomes_a_solid() {
         &path(&folder, "mesh.png"),
     ]);
     for (channel, bytes) in [("rgb", 3), ("id", 4), ("category", 1), ("distance", 4)] {
-        for ending in ["npy", "nrrd", "vti", "tif"] {
+        for ending in ["npy", "nrrd", "vti", "tif", "h5"] {
             let file = path(&folder, &format!("{channel}.{ending}"));
             answer(&["export", &out, "--voxels", "16", "--channel", channel, "-o", &file]);
             assert!(fs::metadata(&file).unwrap().len() >= 16 * 16 * 16 * bytes);
         }
     }
+    // A folder gives way to --force alone, and what was broken off is gone on with.
+    let zarr = path(&folder, "rgb.zarr");
+    answer(&["export", &out, "--voxels", "16", "--resume", "-o", &zarr]);
+    let (code, _, error) = stereology(&["export", &out, "--voxels", "16", "-o", &zarr]);
+    assert!(code == 1 && error.contains("--force"), "{error}");
+    answer(&[
+        "export",
+        &out,
+        "--voxels",
+        "16",
+        "--samples",
+        "2",
+        "--force",
+        "-o",
+        &zarr,
+    ]);
+    let carved = answer(&[
+        "carve",
+        &out,
+        &mesh,
+        "--triangles",
+        "5000",
+        "-o",
+        &path(&folder, "mesh.glb"),
+    ]);
+    assert!(carved["vertices"].as_u64().unwrap() > 4);
+    assert!(fs::read(path(&folder, "mesh.glb")).unwrap().starts_with(b"glTF"));
+    assert_eq!(
+        stereology(&["carve", &out, &mesh, "-o", &path(&folder, "mesh.obj")]).0,
+        2
+    );
+
     // volume.npy is what export gives.
     answer(&["export", &out, "--voxels", "24", "-o", &path(&folder, "volume.npy")]);
     assert!(fs::read(path(&folder, "volume.npy")).unwrap() == fs::read(format!("{out}/volume.npy")).unwrap());

@@ -5,10 +5,11 @@ use crate::gauge::{Gauge, Search};
 use crate::neighbours::Neighbours;
 use crate::particles::{ParticleError, check, fraction};
 use crate::separating_axis::best_axis;
+use crate::surfaces::{self, Placed, Surface};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::fmt;
-use stereology_shape::{BodyKind, Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Particle, PeriodicBox, UnitBody};
 
 /// Particles in a periodic box of which it is proved that none overlap, at their true sizes.
 ///
@@ -24,13 +25,15 @@ use stereology_shape::{BodyKind, Particle, PeriodicBox, UnitBody};
 /// ```
 ///
 /// However the direction was found, the inequality proves the pair apart. Nothing is moved. Touching is no overlap; an allowance of 10⁻¹² of the reach
-/// stands for the rounding of coordinates. For non-convex bodies the hulls are compared, which is sufficient but not necessary.
+/// stands for the rounding of coordinates. Bodies that are not convex, if not even their hulls meet, are apart likewise; else all faces of the two meshes (as
+/// given, not parts or proxies of them) must show such a direction pair by pair, and no piece of either surface may lie inside the other.
 #[derive(Clone, Debug)]
 pub struct Packing {
     bodies: Vec<UnitBody>,
     particles: Vec<Particle>,
     period: PeriodicBox,
     energies: Vec<f64>,
+    iterations: usize,
 }
 
 /// Two particles that could not be shown apart.
@@ -41,7 +44,8 @@ pub struct Overlap {
     pub first: usize,
     /// Index of the other; equal to `first` if a particle meets its own periodic image.
     pub second: usize,
-    /// How far one must be moved to part them, along the direction nearest to parting them: exact for spheres, else an upper bound. A length.
+    /// How far one must be moved to part them, along the direction nearest to parting them: exact for spheres, else an upper bound; for bodies that are not convex
+    /// the depth of the deepest crossing face or enclosed point. A length.
     pub depth: f64,
 }
 
@@ -124,6 +128,7 @@ impl Packing {
                 particles,
                 period: *period,
                 energies: Vec::new(),
+                iterations: 0,
             });
         }
         let mean = particles.iter().map(|p| p.size).sum::<f64>() / particles.len() as f64;
@@ -132,7 +137,13 @@ impl Packing {
     }
 
     pub(crate) fn with_energies(mut self, energies: Vec<f64>) -> Self {
+        self.iterations = energies.len();
         self.energies = energies;
+        self
+    }
+
+    pub(crate) fn with_tries(mut self, tries: usize) -> Self {
+        self.iterations = tries;
         self
     }
 
@@ -178,10 +189,10 @@ impl Packing {
         0.0
     }
 
-    /// How often overlaps were found and relaxed to get here; 0 if the packing was only verified.
+    /// How often overlaps were found and relaxed to get here, or places tried if sequentially; 0 if the packing was only verified.
     #[must_use]
     pub fn iterations(&self) -> usize {
-        self.energies.len()
+        self.iterations
     }
 
     /// Energy of the overlaps at each iteration, Σ ½ depth² over pairs of slightly swollen particles; length².
@@ -228,6 +239,7 @@ pub fn overlaps(
         .iter()
         .map(|p| p.orientation.to_rotation_matrix().into_inner())
         .collect();
+    let surfaces: Vec<Option<Surface>> = surfaces_needed(bodies, particles);
     // The skin makes up for the rounding of the reach.
     let skin = 1e-9 * reach.iter().copied().fold(0.0, f64::max);
     let neighbours = Neighbours::find(&centres, &reach, period.sides(), skin);
@@ -235,16 +247,17 @@ pub fn overlaps(
         .into_par_iter()
         .with_min_len(64)
         .flat_map_iter(|first| {
-            let (centres, turns, neighbours) = (&centres, &turns, &neighbours);
+            let (centres, turns, neighbours, surfaces) = (&centres, &turns, &neighbours, &surfaces);
             neighbours.of(first).1.iter().filter_map(move |neighbour| {
                 let second = neighbour.other as usize;
                 let offset = centres[second] + neighbours.images.shift(neighbour.image) - centres[first];
-                let pose = |i: usize| Posed {
+                let placed = |i: usize| Placed {
                     body: &bodies[particles[i].shape],
+                    surface: surfaces[particles[i].shape].as_ref(),
                     size: particles[i].size,
                     rotation: &turns[i],
                 };
-                let depth = depth(&pose(first), &pose(second), &offset);
+                let depth = depth(&placed(first), &placed(second), &offset);
                 (depth > 0.0).then_some(Overlap { first, second, depth })
             })
         })
@@ -261,10 +274,18 @@ pub fn overlaps(
 /// Allowance for the rounding of coordinates and support points.
 const ROUNDING: f64 = 1e-12;
 
+/// The surfaces of meshes that meet, or are, bodies that are not convex.
+fn surfaces_needed(bodies: &[UnitBody], particles: &[Particle]) -> Vec<Option<Surface>> {
+    let hollow = particles.iter().any(|p| !bodies[p.shape].is_convex());
+    bodies
+        .iter()
+        .map(|body| if hollow { Surface::of(body) } else { None })
+        .collect()
+}
+
 /// 0 if a witness shows two bodies apart, else how deep they overlap.
-fn depth(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>) -> f64 {
-    let sphere = |posed: &Posed<'_>| matches!(posed.body.body().kind(), BodyKind::Sphere { .. });
-    if sphere(a) && sphere(b) {
+fn depth(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> f64 {
+    if a.is_sphere() && b.is_sphere() {
         let touching = 0.5 * (a.size + b.size);
         let distance = offset.norm();
         return if distance >= touching * (1.0 - ROUNDING) {
@@ -273,21 +294,27 @@ fn depth(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>) -> f64 {
             touching - distance
         };
     }
+    let convex = a.body.is_convex() && b.body.is_convex();
+    let (hull_a, hull_b) = (a.hull(), b.hull());
     let search = Search {
         enough: 1.0,
         precision: 1e-13,
         steps: 200,
     };
-    let gauge = Gauge::search(a, b, offset, &search);
-    if witnessed(a, b, offset, &gauge.normal) {
+    let gauge = Gauge::search(&hull_a, &hull_b, offset, &search);
+    if witnessed(&hull_a, &hull_b, offset, &gauge.normal) {
         return 0.0;
+    }
+    if !convex {
+        // Hulls that meet prove nothing.
+        return surfaces::depth(a, b, offset);
     }
     let mut value = gauge.value;
     if gauge.at_most >= 1.0 - 1e-9
-        && let Some((quotient, axis)) = best_axis(a, b, offset)
+        && let Some((quotient, axis)) = best_axis(&hull_a, &hull_b, offset)
     {
         // The search ended on a degenerate portal, or too near to touching to tell.
-        if witnessed(a, b, offset, &axis) {
+        if witnessed(&hull_a, &hull_b, offset, &axis) {
             return 0.0;
         }
         value = value.max(quotient);
@@ -297,9 +324,5 @@ fn depth(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>) -> f64 {
 
 /// Whether the bodies lie apart in a direction, computed from their support points in world axes and nothing else.
 fn witnessed(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>, normal: &Vector3<f64>) -> bool {
-    let reach = |posed: &Posed<'_>, n: Vector3<f64>| {
-        let local = posed.rotation.tr_mul(&n);
-        posed.size * local.dot(&posed.body.support(&local).coords)
-    };
-    *normal != Vector3::zeros() && (reach(a, *normal) + reach(b, -normal)) * (1.0 - ROUNDING) <= normal.dot(offset)
+    *normal != Vector3::zeros() && (a.reach(normal) + b.reach(&-normal)) * (1.0 - ROUNDING) <= normal.dot(offset)
 }

@@ -10,7 +10,8 @@
 //! the whole runs uphill, it needs less than half the iterations for spheres (lognormal σ .3, 10,000 at .64: 185-400 against 581), and does not stall on
 //! flat faces: their energy has creases, on which a few rattling cubes stop everybody for ever (500 cubes at .6: 75 iterations; FIRE did not end in 2,000).
 
-use crate::assembly::{Assembly, Memory, Overlaps};
+use crate::assembly::Assembly;
+use crate::contacts::{Memory, Overlaps};
 use crate::neighbours::Neighbours;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

@@ -3,19 +3,55 @@
 use nalgebra::{Matrix3, Vector3};
 use stereology_shape::UnitBody;
 
-/// A body at a size and in an orientation, about its own centroid.
+/// Something convex about the origin, in its own axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Solid<'a> {
+    /// A body about its centroid; of one that is not convex, its hull.
+    Body(&'a UnitBody),
+    /// The hull of points, of which the origin is an inner one.
+    Points(&'a [Vector3<f64>]),
+}
+
+impl Solid<'_> {
+    /// The furthest point in `direction`.
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Body(body) => body.support(direction).coords,
+            Self::Points(points) => {
+                let mut best = (f64::NEG_INFINITY, Vector3::zeros());
+                for point in *points {
+                    let height = point.dot(direction);
+                    if height > best.0 {
+                        best = (height, *point);
+                    }
+                }
+                best.1
+            }
+        }
+    }
+}
+
+/// A solid at a size and in an orientation, about its own origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Posed<'a> {
-    pub(crate) body: &'a UnitBody,
+    pub(crate) solid: Solid<'a>,
     pub(crate) size: f64,
     /// From the body's axes to the world's.
     pub(crate) rotation: &'a Matrix3<f64>,
 }
 
+impl Posed<'_> {
+    /// How far the solid reaches in a unit direction of the world.
+    pub(crate) fn reach(&self, direction: &Vector3<f64>) -> f64 {
+        let local = self.rotation.tr_mul(direction);
+        self.size * local.dot(&self.solid.support(&local))
+    }
+}
+
 /// All `p_A − p_B`, in the axes of the first body.
 pub(crate) struct Difference<'a> {
-    a: &'a UnitBody,
-    b: &'a UnitBody,
+    a: Solid<'a>,
+    b: Solid<'a>,
     size_a: f64,
     size_b: f64,
     /// From the axes of `b` to those of `a`.
@@ -40,18 +76,18 @@ impl<'a> Difference<'a> {
     pub(crate) fn new(a: &Posed<'a>, b: &Posed<'a>) -> Self {
         let turn = a.rotation.tr_mul(b.rotation);
         Self {
-            a: a.body,
-            b: b.body,
+            a: a.solid,
+            b: b.solid,
             size_a: a.size,
             size_b: b.size,
             turn,
         }
     }
 
-    /// The furthest point in `direction`; of non-convex bodies, that of their hulls.
+    /// The furthest point in `direction`.
     pub(crate) fn furthest(&self, direction: &Vector3<f64>) -> Meeting {
-        let on_a = self.a.support(direction).coords * self.size_a;
-        let in_b = self.b.support(&-self.turn.tr_mul(direction)).coords * self.size_b;
+        let on_a = self.a.support(direction) * self.size_a;
+        let in_b = self.b.support(&-self.turn.tr_mul(direction)) * self.size_b;
         Meeting {
             at: on_a - self.turn * in_b,
             on_a,

@@ -48,26 +48,40 @@
     reason = "particles are fewer than 2^32 (checked), cells fewer than 2^40, and floors of bounded floats are meant"
 )]
 
+mod annealing;
 mod assembly;
 mod certificate;
+mod contacts;
+mod convex_parts;
 mod damped;
 mod densities;
 mod density_limit;
 mod difference;
+mod equilibrium;
 mod gauge;
 mod neighbours;
+mod occupancy;
+mod one_by_one;
+mod options;
 mod pack;
 mod paper;
 mod particles;
 mod population;
+mod proxies;
 mod separating_axis;
+mod sequential;
+mod surfaces;
 
 pub use certificate::{Overlap, Overlaps, Packing, VerifyError, overlaps};
+pub use convex_parts::ConvexParts;
 pub use densities::{SizeDensities, SizeInBin, counts_from_densities, grains_from_densities};
 pub use density_limit::density_limit;
-pub use pack::{Mode, PackError, PackOptions, Unresolved, pack};
+pub use equilibrium::equilibrate;
+pub use options::{Mode, PackOptions};
+pub use pack::{Jam, PackError, Unresolved, pack};
 pub use particles::ParticleError;
 pub use population::{
     Grain, PopulationError, box_for_fraction, count_to_fill, lognormal_sizes, mix, populate, scale_to_fraction,
     total_volume,
 };
+pub use proxies::Proxy;

@@ -197,7 +197,7 @@ impl Grid {
 }
 
 /// Levels by reach, each about twice as coarse as the one before; sparsely filled ones join the next.
-fn levels(reach: &[f64]) -> Vec<u8> {
+pub(crate) fn levels(reach: &[f64]) -> Vec<u8> {
     let smallest = reach.iter().copied().fold(f64::INFINITY, f64::min);
     let fine: Vec<usize> = reach
         .iter()

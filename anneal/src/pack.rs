@@ -1,99 +1,19 @@
 //! From any arrangement of particles to one without overlaps.
 
-use crate::assembly::{Assembly, Memory, Overlaps as Pushes, SWELLING_MOST};
+use crate::annealing;
+use crate::assembly::{Assembly, SWELLING_MOST};
 use crate::certificate::{Overlaps, Packing, VerifyError};
+use crate::contacts::{Memory, Overlaps as Pushes};
 use crate::damped::{self, End, Limits};
 use crate::density_limit::density_limit;
+use crate::options::{Mode, PackOptions};
 use crate::paper;
 use crate::particles::{ParticleError, check, fraction};
+use crate::proxies::StandIn;
+use crate::sequential::{self, Filling};
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
-
-/// How particles are moved apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Mode {
-    /// Descent with momentum on the energy of overlaps; bodies turn as well as move.
-    #[default]
-    Fast,
-    /// Jagnow, Dorsey & Rushmeier 2004, section 4.1: find all collisions, push positions apart, repeat. Orientations stay; about ten times the iterations.
-    Paper,
-}
-
-/// What [`pack`] may do.
-///
-/// # Examples
-///
-/// ```
-/// use stereology_anneal::{Mode, PackOptions};
-///
-/// let options = PackOptions::default().with_mode(Mode::Paper).with_iterations(500);
-/// assert_eq!(options.iterations, 500);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PackOptions {
-    /// How particles are moved apart.
-    pub mode: Mode,
-    /// Give up after so many iterations.
-    pub iterations: usize,
-    /// Sizes are multiplied by this while packing, from 1.0001 to 1.05; `None`: by 1.02 where there is room, down to 1.002 where there is little. True sizes
-    /// are certified.
-    pub swelling: Option<f64>,
-    /// Pack the convex hulls of bodies that are not convex, instead of refusing them.
-    pub hulls: bool,
-    /// For the random shaking of particles that jam.
-    pub seed: u64,
-}
-
-impl Default for PackOptions {
-    fn default() -> Self {
-        Self {
-            mode: Mode::Fast,
-            iterations: 20_000,
-            swelling: None,
-            hulls: false,
-            seed: 0,
-        }
-    }
-}
-
-impl PackOptions {
-    /// How particles are moved apart.
-    #[must_use]
-    pub const fn with_mode(mut self, mode: Mode) -> Self {
-        self.mode = mode;
-        self
-    }
-
-    /// Give up after so many iterations.
-    #[must_use]
-    pub const fn with_iterations(mut self, iterations: usize) -> Self {
-        self.iterations = iterations;
-        self
-    }
-
-    /// Factor of sizes while packing.
-    #[must_use]
-    pub const fn with_swelling(mut self, swelling: f64) -> Self {
-        self.swelling = Some(swelling);
-        self
-    }
-
-    /// Take the hulls of bodies that are not convex.
-    #[must_use]
-    pub const fn with_hulls(mut self) -> Self {
-        self.hulls = true;
-        self
-    }
-
-    /// Seed of the shaking.
-    #[must_use]
-    pub const fn with_seed(mut self, seed: u64) -> Self {
-        self.seed = seed;
-        self
-    }
-}
 
 /// Why there is no packing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -114,14 +34,6 @@ pub enum PackError {
         /// Shortest side of the box.
         side: f64,
     },
-    /// Packing of non-convex bodies is not available yet.
-    #[error(
-        "shape {shape} is not convex: packing such bodies is not available yet; pack their convex hulls instead (PackOptions::with_hulls)"
-    )]
-    NotConvex {
-        /// Which shape.
-        shape: usize,
-    },
     /// No packing so dense is known to be possible.
     #[error(
         "a volume fraction of {fraction:.4} is more than such bodies are known to reach ({limit:.4}): ask for less"
@@ -135,6 +47,12 @@ pub enum PackError {
     /// An option is out of range.
     #[error("the swelling {0} is not between 1.0001 and 1.05")]
     Swelling(f64),
+    /// An option is out of range.
+    #[error("the volume tolerance of convex parts {0} is not between 0.005 and 1")]
+    Tolerance(f64),
+    /// No vacant place was found for a particle.
+    #[error("{0}")]
+    Jammed(Box<Jam>),
     /// Overlaps remain.
     #[error("{0}")]
     Unresolved(Box<Unresolved>),
@@ -162,6 +80,28 @@ pub struct Unresolved {
     pub particles: Vec<Particle>,
 }
 
+/// Where sequential placing came to an end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "jammed at a volume fraction of {reached:.4} (of {fraction:.4}): {} of {count} particles found a vacant place, the next, of size {size:.4}, none in {tries} tries; take a lower fraction, or mode fast, which moves particles aside",
+    placed.len()
+)]
+#[non_exhaustive]
+pub struct Jam {
+    /// The particles that have a place, the largest first.
+    pub placed: Vec<Particle>,
+    /// How many there are in all.
+    pub count: usize,
+    /// Size of the one that found none.
+    pub size: f64,
+    /// How many places it was tried at.
+    pub tries: usize,
+    /// The volume fraction of those that have a place.
+    pub reached: f64,
+    /// The volume fraction asked for.
+    pub fraction: f64,
+}
+
 /// Moves (and turns) particles until none overlap, and proves it.
 ///
 /// Positions and orientations given are where they start, overlapping as they may; [`populate`](crate::populate) draws them at random. Number, sizes and
@@ -170,7 +110,8 @@ pub struct Unresolved {
 /// # Method
 ///
 /// [`Mode::Fast`] minimises `Σ ½ δ²` by gradient descent with momentum, where `δ` is the depth of an overlap along the direction in which the pair would
-/// first part if both shrank about their centroids: towards each other's centres for spheres, found by portal refinement for other convex bodies. Bodies that
+/// first part if both shrank about their centroids: towards each other's centres for spheres, found by portal refinement for other convex bodies, between convex
+/// parts ([`ConvexParts`](crate::ConvexParts)) for bodies that are not convex. Bodies that
 /// are not spheres start with up to a hundred iterations as spheres of their volumes. Sizes are swollen by half a percent or so meanwhile: then overlaps at
 /// true size vanish altogether in finite time. The same bits at any number of threads.
 ///
@@ -183,7 +124,7 @@ pub struct Unresolved {
 ///
 /// # Errors
 ///
-/// [`PackError::Unresolved`] with what remains, if particles jam; [`PackError::TooDense`], [`PackError::TooWide`], [`PackError::NotConvex`] and
+/// [`PackError::Unresolved`] with what remains, if particles jam; [`PackError::Jammed`] if one finds no place; [`PackError::TooDense`], [`PackError::TooWide`] and
 /// [`PackError::Particle`] before anything is done; [`PackError::Cancelled`].
 ///
 /// # Examples
@@ -209,10 +150,13 @@ pub fn pack(
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<Packing, PackError> {
     check(bodies, &particles, period)?;
-    let fraction = refuse_the_impossible(bodies, &particles, period, options)?;
+    let fraction = refuse_the_impossible(bodies, &particles, period)?;
     let swelling = options.swelling.unwrap_or_else(|| swelling_for(fraction));
     if !(1.0001..=SWELLING_MOST).contains(&swelling) {
         return Err(PackError::Swelling(swelling));
+    }
+    if !(0.005..=1.0).contains(&options.tolerance) {
+        return Err(PackError::Tolerance(options.tolerance));
     }
     let limits = Limits {
         swelling,
@@ -223,7 +167,12 @@ pub fn pack(
     let guess = Guess::new(progress);
     let report = |pushes: &Pushes| guess.report(pushes);
     let mut energies = Vec::new();
-    let mut assembly = Assembly::new(bodies, particles, period);
+    let stand_ins: Vec<StandIn> = bodies
+        .iter()
+        .map(|body| StandIn::of(body, options.proxy, options.tolerance))
+        .collect();
+    let mut assembly = Assembly::new(bodies, &stand_ins, particles, period);
+    let mut tries = 0;
     let end = match options.mode {
         Mode::Paper => paper::relax(&mut assembly, period, &limits, &mut energies, &report),
         Mode::Fast => {
@@ -231,6 +180,26 @@ pub fn pack(
                 return Err(PackError::Cancelled);
             }
             damped::relax(&mut assembly, period, &limits, &mut energies, &report)
+        }
+        Mode::Anneal => annealing::anneal(&mut assembly, period, &limits, &mut energies, progress),
+        Mode::Sequential => {
+            let each = options.iterations;
+            match sequential::fill(&mut assembly, period, each, options.seed, &mut tries, progress) {
+                Filling::Complete => End::Apart,
+                Filling::Cancelled => End::Cancelled,
+                Filling::Jammed { placed, next } => {
+                    let particles = assembly.into_particles(period);
+                    let placed: Vec<Particle> = placed.into_iter().map(|i| particles[i]).collect();
+                    return Err(PackError::Jammed(Box::new(Jam {
+                        reached: self::fraction(bodies, &placed, period),
+                        placed,
+                        count: particles.len(),
+                        size: particles[next].size,
+                        tries: each,
+                        fraction,
+                    })));
+                }
+            }
         }
     };
     if end == End::Cancelled {
@@ -241,7 +210,10 @@ pub fn pack(
         Ok(packing) => {
             // Nothing is left to cancel; a caller who breaks now has the packing all the same.
             let _ = progress(1.0);
-            Ok(packing.with_energies(energies))
+            Ok(match options.mode {
+                Mode::Sequential => packing.with_tries(tries),
+                _ => packing.with_energies(energies),
+            })
         }
         Err(VerifyError::Particle(error)) => Err(error.into()),
         Err(VerifyError::Overlap(overlaps)) => {
@@ -261,14 +233,10 @@ fn refuse_the_impossible(
     bodies: &[UnitBody],
     particles: &[Particle],
     period: &PeriodicBox,
-    options: &PackOptions,
 ) -> Result<f64, PackError> {
     let side = period.sides().min();
     for (index, particle) in particles.iter().enumerate() {
         let body = &bodies[particle.shape];
-        if !body.is_convex() && !options.hulls {
-            return Err(PackError::NotConvex { shape: particle.shape });
-        }
         let diameter = 2.0 * body.inscribed_radius() * particle.size;
         if diameter > side {
             return Err(PackError::TooWide { index, diameter, side });

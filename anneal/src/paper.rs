@@ -5,7 +5,8 @@
 //! Jagnow, Dorsey & Rushmeier 2004, section 4.1. The text gives neither step nor stopping rule; collisions are found anew at every iteration in a grid, every
 //! colliding pair is pushed apart along its direction of contact by a part of its depth, all pairs at once, and orientations stay as they were drawn.
 
-use crate::assembly::{Assembly, Memory, Overlaps};
+use crate::assembly::Assembly;
+use crate::contacts::{Memory, Overlaps};
 use crate::damped::{APART, End, Limits};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;

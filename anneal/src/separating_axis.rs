@@ -1,6 +1,6 @@
 //! The separating-axis test: for polytopes that a search cannot settle, every direction that could part them.
 
-use crate::difference::Posed;
+use crate::difference::{Posed, Solid};
 use crate::gauge::Gauge;
 use nalgebra::Vector3;
 
@@ -36,7 +36,8 @@ struct Directions {
 
 impl Directions {
     fn of(posed: &Posed<'_>) -> Option<Self> {
-        let hull = posed.body.mesh()?.hull();
+        let Solid::Body(body) = posed.solid else { return None };
+        let hull = body.mesh()?.hull();
         let (mut faces, mut edges) = (Vec::new(), Vec::new());
         for triangle in &hull.triangles {
             let [p, q, r] = triangle.map(|v| hull.vertices[v as usize]);
@@ -64,7 +65,7 @@ fn add(list: &mut Vec<Vector3<f64>>, direction: Vector3<f64>) {
 #[cfg(test)]
 mod tests {
     use super::best_axis;
-    use crate::difference::Posed;
+    use crate::difference::{Posed, Solid};
     use crate::gauge::{Gauge, Search};
     use nalgebra::{Matrix3, Vector3};
     use rand::{RngExt, SeedableRng};
@@ -87,12 +88,12 @@ mod tests {
             let turns: [Matrix3<f64>; 2] =
                 std::array::from_fn(|_| isotropic_rotation(&mut rng).to_rotation_matrix().into_inner());
             let a = Posed {
-                body: &bodies[case % 3],
+                solid: Solid::Body(&bodies[case % 3]),
                 size: 1.0,
                 rotation: &turns[0],
             };
             let b = Posed {
-                body: &bodies[case / 3 % 3],
+                solid: Solid::Body(&bodies[case / 3 % 3]),
                 size: 0.7,
                 rotation: &turns[1],
             };
@@ -114,7 +115,7 @@ mod tests {
         let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
         let turn = Matrix3::identity();
         let posed = Posed {
-            body: &cube,
+            solid: Solid::Body(&cube),
             size: cube.body().size(),
             rotation: &turn,
         };
@@ -137,12 +138,12 @@ mod tests {
             let turns: [Matrix3<f64>; 2] =
                 std::array::from_fn(|_| isotropic_rotation(&mut rng).to_rotation_matrix().into_inner());
             let a = Posed {
-                body: &rock,
+                solid: Solid::Body(&rock),
                 size: 1.0,
                 rotation: &turns[0],
             };
             let b = Posed {
-                body: &ball,
+                solid: Solid::Body(&ball),
                 size: 1.3,
                 rotation: &turns[1],
             };

@@ -45,7 +45,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A square bar bent to a U.
 fn hook() -> TriangleMesh {
-    cells(&[[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0], [0, 2, 0], [2, 2, 0]])
+    cells(&[
+        [0, 0, 0],
+        [1, 0, 0],
+        [2, 0, 0],
+        [0, 1, 0],
+        [2, 1, 0],
+        [0, 2, 0],
+        [2, 2, 0],
+    ])
 }
 
 /// Three crossed bars.

@@ -64,7 +64,7 @@ impl ConvexParts {
             // The part that holds most of what is too much.
             let Some(worst) = (0..pieces.len())
                 .filter(|&i| !pieces[i].final_form)
-                .max_by(|&i, &j| pieces[i].excess(body).total_cmp(&pieces[j].excess(body)).then(j.cmp(&i)))
+                .max_by(|&i, &j| pieces[i].excess().total_cmp(&pieces[j].excess()).then(j.cmp(&i)))
             else {
                 break;
             };
@@ -127,20 +127,18 @@ impl Piece {
     }
 
     /// How much larger than its contents its hull is, roughly.
-    fn excess(&self, _body: &UnitBody) -> f64 {
+    fn excess(&self) -> f64 {
         self.hull.volume() - self.filled.unwrap_or(0.0)
     }
 
     /// The best cut in two (or one, if a half is empty); none if there is no better than none.
     fn halved(&self, body: &UnitBody) -> Vec<Self> {
+        let extent = |axis: usize| {
+            let along = self.hull.vertices().iter().map(|v| v[axis]);
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
+        };
         let cuts: Vec<(usize, f64)> = (0..3)
-            .flat_map(|axis| {
-                let along: Vec<f64> = self.hull.vertices().iter().map(|v| v[axis]).collect();
-                let (from, to) = along
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
-                (1..=PLANES).map(move |k| (axis, from + (to - from) * k as f64 / (PLANES + 1) as f64))
-            })
+            .flat_map(|axis| self.planes(axis, extent(axis)).into_iter().map(move |at| (axis, at)))
             .collect();
         let tried: Vec<(f64, Vec<Self>)> = cuts
             .par_iter()
@@ -152,23 +150,42 @@ impl Piece {
                 (halves.iter().map(|half| half.hull.volume()).sum(), halves)
             })
             .collect();
-        let extent = |axis: usize| {
-            let along = self.hull.vertices().iter().map(|v| v[axis]);
-            let (from, to) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            to - from
+        let length = |axis: usize| extent(axis).1 - extent(axis).0;
+        let longest = (0..3).fold(0, |best, axis| if length(axis) > length(best) { axis } else { best });
+        let along: Vec<usize> = (0..cuts.len()).filter(|&k| cuts[k].0 == longest).collect();
+        let Some(&middle) = along.get(along.len() / 2) else {
+            return Vec::new();
         };
-        let longest = (0..3).fold(0, |best, axis| if extent(axis) > extent(best) { axis } else { best });
-        let (mut chosen, mut least) = (longest * PLANES + PLANES / 2, (1.0 - WORTHWHILE) * self.hull.volume());
+        let (mut chosen, mut least) = (middle, (1.0 - WORTHWHILE) * self.hull.volume());
         for (number, (volume, _)) in tried.iter().enumerate() {
             if *volume < least * (1.0 - 1e-9) {
                 (chosen, least) = (number, *volume);
             }
         }
-        let mut halves = tried.into_iter().nth(chosen).map(|(_, halves)| halves).unwrap_or_default();
+        let mut halves = tried
+            .into_iter()
+            .nth(chosen)
+            .map(|(_, halves)| halves)
+            .unwrap_or_default();
         for half in &mut halves {
             half.filled = Some(half.count(body));
         }
         halves
+    }
+
+    /// Where to try a cut across an axis: through the corners of the surface if they lie in few planes (edges of blocks), else evenly.
+    fn planes(&self, axis: usize, (from, to): (f64, f64)) -> Vec<f64> {
+        let hair = 1e-6 * (to - from);
+        let mut corners: Vec<f64> = self.polygons.iter().flatten().map(|p| p[axis]).collect();
+        corners.retain(|x| from + hair < *x && *x < to - hair);
+        corners.sort_by(f64::total_cmp);
+        corners.dedup_by(|x, y| (*x - *y).abs() <= hair);
+        if (1..=2 * PLANES).contains(&corners.len()) {
+            return corners;
+        }
+        (1..=PLANES)
+            .map(|k| from + (to - from) * k as f64 / (PLANES + 1) as f64)
+            .collect()
     }
 
     /// The part on one side of a plane across an axis; none if it has no volume.
@@ -232,6 +249,10 @@ fn corners(low: &Point3<f64>, high: &Point3<f64>) -> impl Iterator<Item = Point3
 /// What of a convex polygon lies on one side of a plane across an axis (Sutherland & Hodgman 1974).
 fn clipped(polygon: &[Point3<f64>], axis: usize, at: f64, above: bool) -> Vec<Point3<f64>> {
     let height = |p: &Point3<f64>| if above { p[axis] - at } else { at - p[axis] };
+    // What only touches the plane bounds the other half.
+    if polygon.iter().all(|p| height(p) <= 0.0) {
+        return Vec::new();
+    }
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (i, here) in polygon.iter().enumerate() {
         let next = &polygon[(i + 1) % polygon.len()];
@@ -261,7 +282,11 @@ mod tests {
         let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 24, 12)).unwrap();
         let ring = UnitBody::new(&Body::from_mesh(ring));
         let parts = ConvexParts::of(&ring, 0.1);
-        assert!(parts.excess() <= 0.1 && parts.hulls().len() < 40, "{}", parts.hulls().len());
+        assert!(
+            parts.excess() <= 0.1 && parts.hulls().len() < 40,
+            "{}",
+            parts.hulls().len()
+        );
         let parts: Vec<UnitBody> = parts
             .hulls()
             .iter()

@@ -2,12 +2,14 @@
 //!
 //! A material is rebuilt by giving every particle of the recovered size distribution a random place and orientation in a box that repeats in x, y and z,
 //! and pushing overlapping ones apart: Jagnow, Dorsey & Rushmeier 2004, section 4.1. Number, sizes and categories never change, so the volume fraction is
-//! exactly the one asked for. Spheres, ellipsoids and convex meshes mix freely; a particle may be larger than half the box.
+//! exactly the one asked for. Spheres, ellipsoids and meshes, convex or not, mix freely; a particle may be larger than half the box.
 //!
 //! - How deep a pair overlaps is the factor `γ = max n·d / (h_A(n) + h_B(−n))` by which it would have to shrink to part: one maximum, however deep.
 //! - [`pack`] minimises the sum of squared depths by descent with momentum, in tens to hundreds of iterations; [`Mode::Paper`] keeps the way of the paper.
 //! - [`Packing`] can only be made by [`Packing::verify`], which moves nothing and finds for every pair and every periodic image a direction that separates it.
-//!   "No overlap seen while moving" proves nothing: such a run has left overlaps of 8.5 10⁻⁴ diameters.
+//!   "No overlap seen while moving" proves nothing: such a run has left overlaps of 8.5 10⁻⁴ diameters. Meshes that are not convex are moved by convex parts
+//!   ([`ConvexParts`]) or simpler proxies, and certified by the faces of the mesh itself.
+//! - [`radial_distribution`], [`bond_order`], [`orientation_tensor`] and [`section_test`] judge a packing; [`equilibrate`] makes it forget how it was made.
 //!
 //! # Examples
 //!
@@ -63,11 +65,14 @@ mod neighbours;
 mod occupancy;
 mod one_by_one;
 mod options;
+mod order;
 mod pack;
 mod paper;
 mod particles;
 mod population;
 mod proxies;
+mod radial;
+mod section_test;
 mod separating_axis;
 mod sequential;
 mod surfaces;
@@ -78,6 +83,7 @@ pub use densities::{SizeDensities, SizeInBin, counts_from_densities, grains_from
 pub use density_limit::density_limit;
 pub use equilibrium::equilibrate;
 pub use options::{Mode, PackOptions};
+pub use order::{BondOrder, OrientationTensor, bond_order, orientation_tensor};
 pub use pack::{Jam, PackError, Unresolved, pack};
 pub use particles::ParticleError;
 pub use population::{
@@ -85,3 +91,5 @@ pub use population::{
     total_volume,
 };
 pub use proxies::Proxy;
+pub use radial::{Distance, RadialDistribution, carnahan_starling, radial_distribution};
+pub use section_test::{SectionTest, section_test};

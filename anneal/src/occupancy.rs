@@ -36,7 +36,8 @@ impl Occupancy {
             .map(|(longest_reach, bodies)| {
                 let most = ((2 * bodies + 8) as f64).cbrt();
                 let cells: [i64; 3] = std::array::from_fn(|axis| {
-                    let fit = (sides[axis] / (2.0 * longest_reach).max(f64::MIN_POSITIVE)).min(most * sides[axis] / mean_side);
+                    let fit = (sides[axis] / (2.0 * longest_reach).max(f64::MIN_POSITIVE))
+                        .min(most * sides[axis] / mean_side);
                     (fit.floor() as i64).clamp(1, 1024)
                 });
                 Level {

@@ -229,11 +229,7 @@ pub fn pack(
     }
 }
 
-fn refuse_the_impossible(
-    bodies: &[UnitBody],
-    particles: &[Particle],
-    period: &PeriodicBox,
-) -> Result<f64, PackError> {
+fn refuse_the_impossible(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<f64, PackError> {
     let side = period.sides().min();
     for (index, particle) in particles.iter().enumerate() {
         let body = &bodies[particle.shape];

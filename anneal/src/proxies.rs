@@ -51,7 +51,11 @@ impl StandIn {
             .flat_map(|part| part.points.iter().map(|p| (part.centre + p).norm() + 0.05 * p.norm()))
             .fold(0.0, f64::max);
         Self {
-            reach: if parts.is_empty() { body.bounding_radius() } else { reach },
+            reach: if parts.is_empty() {
+                body.bounding_radius()
+            } else {
+                reach
+            },
             parts,
         }
     }
@@ -103,7 +107,11 @@ mod tests {
     /// In every direction an outline reaches as far as its body or a little farther.
     #[test]
     fn outlines_hold_their_bodies() {
-        for body in [Body::rock(4), Body::cylinder(1.0, 2.0).unwrap(), Body::cuboid([1.0, 2.0, 3.0]).unwrap()] {
+        for body in [
+            Body::rock(4),
+            Body::cylinder(1.0, 2.0).unwrap(),
+            Body::cuboid([1.0, 2.0, 3.0]).unwrap(),
+        ] {
             let body = UnitBody::new(&body);
             let stand_in = StandIn::of(&body, Proxy::Outline, 0.05);
             let part = &stand_in.parts[0];
@@ -111,7 +119,11 @@ mod tests {
                 let (z, angle) = (f64::from(k) / 250.0 - 1.0, 2.4 * f64::from(k));
                 let around = (1.0 - z * z).max(0.0).sqrt();
                 let normal = Vector3::new(around * angle.cos(), around * angle.sin(), z);
-                let reach = part.points.iter().map(|p| normal.dot(&(p + part.centre))).fold(0.0, f64::max);
+                let reach = part
+                    .points
+                    .iter()
+                    .map(|p| normal.dot(&(p + part.centre)))
+                    .fold(0.0, f64::max);
                 let own = normal.dot(&body.support(&normal).coords);
                 assert!(own <= reach && reach < 1.35 * own, "{own} {reach}");
             }

@@ -85,7 +85,11 @@ fn split(balls: &mut Vec<Ball>, triangles: &mut [[Vector3<f64>; 3]], start: usiz
         .flatten()
         .fold((corner, corner), |(low, high), p| (low.inf(p), high.sup(p)));
     let centre = 0.5 * (low + high);
-    let radius = triangles.iter().flatten().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+    let radius = triangles
+        .iter()
+        .flatten()
+        .map(|p| (p - centre).norm())
+        .fold(0.0, f64::max);
     let at = balls.len();
     let count = if triangles.len() <= LEAF { triangles.len() } else { 0 };
     balls.push(Ball {
@@ -291,7 +295,12 @@ fn enclosed(a: &Placed<'_>, of_a: &Surface, b: &Placed<'_>, offset: &Vector3<f64
                 continue;
             };
             let middle = (p + q + r) / 3.0;
-            for point in [middle, 0.4 * middle + 0.6 * p, 0.4 * middle + 0.6 * q, 0.4 * middle + 0.6 * r] {
+            for point in [
+                middle,
+                0.4 * middle + 0.6 * p,
+                0.4 * middle + 0.6 * q,
+                0.4 * middle + 0.6 * r,
+            ] {
                 ask(&(point - normal * BELOW), 0.5 * BELOW * a.size.min(b.size));
             }
         }

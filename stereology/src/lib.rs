@@ -40,6 +40,8 @@
 #[cfg(feature = "pipeline")]
 pub mod files;
 #[cfg(feature = "pipeline")]
+pub mod pictures;
+#[cfg(feature = "pipeline")]
 pub mod pipeline;
 #[cfg(feature = "pipeline")]
 pub mod sample;

@@ -3,8 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test that fails says where")]
 
 mod brute_force;
+mod hollow;
+mod modes;
 mod overlaps;
 mod packings;
 mod populations;
+mod quality;
 mod refusals;
 mod sections;

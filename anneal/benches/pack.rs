@@ -6,8 +6,11 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::ops::ControlFlow;
 use std::time::Duration;
-use stereology_anneal::{Mode, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, overlaps, pack, populate};
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+use stereology_anneal::{
+    Distance, Mode, PackOptions, Packing, bond_order, box_for_fraction, equilibrate, lognormal_sizes, mix, overlaps,
+    pack, populate, radial_distribution, section_test,
+};
+use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
 
 fn start(bodies: &[UnitBody], count: usize, fraction: f64) -> (Vec<Particle>, PeriodicBox) {
     let sizes = lognormal_sizes(count, 0.3, 0).expect("a valid width");
@@ -45,9 +48,21 @@ fn packs(c: &mut Criterion) {
         });
     }
     let (particles, period) = start(&sphere, 1000, 0.3);
-    let paper = PackOptions::default().with_mode(Mode::Paper);
-    group.bench_function("spheres 1000 at .30, paper", |b| {
-        b.iter(|| packed(&sphere, &particles, &period, &paper));
+    for (name, mode) in [
+        ("spheres 1000 at .30, paper", Mode::Paper),
+        ("spheres 1000 at .30, anneal", Mode::Anneal),
+        ("spheres 1000 at .30, sequential", Mode::Sequential),
+    ] {
+        let options = PackOptions::default().with_mode(mode);
+        group.bench_function(name, |b| {
+            b.iter(|| packed(&sphere, &particles, &period, &options));
+        });
+    }
+    let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.7, 24, 12)).expect("a closed mesh");
+    let ring = [UnitBody::new(&Body::from_mesh(ring))];
+    let (particles, period) = start(&ring, 100, 0.2);
+    group.bench_function("rings 100 at .20", |b| {
+        b.iter(|| packed(&ring, &particles, &period, &PackOptions::default()));
     });
     group.finish();
 }
@@ -67,5 +82,28 @@ fn certificates(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, packs, certificates);
+fn qualities(c: &mut Criterion) {
+    let sphere = [UnitBody::new(&Body::sphere(1.0).expect("a sphere"))];
+    let (particles, period) = start(&sphere, 1000, 0.3);
+    let packing = packed(&sphere, &particles, &period, &PackOptions::default());
+    let particles = packing.particles();
+    let mut group = c.benchmark_group("quality");
+    group
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_millis(300));
+    group.bench_function("radial_distribution 1000", |b| {
+        b.iter(|| radial_distribution(black_box(particles), &period, Distance::Contacts, 3.0, 60));
+    });
+    group.bench_function("bond_order 1000", |b| b.iter(|| bond_order(black_box(particles), &period, 1.4)));
+    group.bench_function("section_test 1000, 10 replicates", |b| {
+        b.iter(|| section_test(black_box(&packing), 5, 10, 0));
+    });
+    group.bench_function("equilibrate 1000, 10 sweeps", |b| {
+        b.iter(|| equilibrate(black_box(&packing), 10, 0, &|_| ControlFlow::Continue(())).expect("not cancelled"));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, packs, certificates, qualities);
 criterion_main!(benches);

@@ -94,6 +94,13 @@ impl ConvexParts {
     }
 }
 
+/// One side of a cut.
+enum Half {
+    Filled(Box<Piece>),
+    Empty,
+    Flat,
+}
+
 /// What lies of a body in one box.
 struct Piece {
     low: Point3<f64>,
@@ -143,10 +150,15 @@ impl Piece {
         let tried: Vec<(f64, Vec<Self>)> = cuts
             .par_iter()
             .map(|&(axis, at)| {
-                let halves: Vec<Self> = [false, true]
-                    .iter()
-                    .filter_map(|&above| self.half(body, axis, at, above))
-                    .collect();
+                let mut halves = Vec::new();
+                for above in [false, true] {
+                    match self.half(body, axis, at, above) {
+                        Half::Filled(half) => halves.push(*half),
+                        Half::Empty => {}
+                        // What is left of a cut that cannot be measured must not be lost.
+                        Half::Flat => return (f64::INFINITY, Vec::new()),
+                    }
+                }
                 (halves.iter().map(|half| half.hull.volume()).sum(), halves)
             })
             .collect();
@@ -188,8 +200,8 @@ impl Piece {
             .collect()
     }
 
-    /// The part on one side of a plane across an axis; none if it has no volume.
-    fn half(&self, body: &UnitBody, axis: usize, at: f64, above: bool) -> Option<Self> {
+    /// The part on one side of a plane across an axis.
+    fn half(&self, body: &UnitBody, axis: usize, at: f64, above: bool) -> Half {
         let (mut low, mut high) = (self.low, self.high);
         if above {
             low[axis] = at;
@@ -206,15 +218,20 @@ impl Piece {
         points.extend(corners(&low, &high).filter(|corner| body.contains(corner)));
         points.sort_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)));
         points.dedup();
-        let hull = convex_hull(&points).ok()?;
-        Some(Self {
+        if points.is_empty() {
+            return Half::Empty;
+        }
+        let Ok(hull) = convex_hull(&points) else {
+            return Half::Flat;
+        };
+        Half::Filled(Box::new(Self {
             low,
             high,
             polygons,
             hull,
             filled: None,
             final_form: false,
-        })
+        }))
     }
 
     /// Volume of the body in the hull's box, from a grid of points.
@@ -299,9 +316,12 @@ mod tests {
             let p = nalgebra::Point3::from(nalgebra::Vector3::from_fn(|_, _| 1.6 * rng.random::<f64>() - 0.8));
             if ring.contains(&p) {
                 inside += 1;
-                assert!(parts.iter().zip(&centres).any(|(part, centre)| {
-                    part.signed_distance(&((p - centre) / part.body().size()).into()) < 1e-9
-                }));
+                let outside = parts
+                    .iter()
+                    .zip(&centres)
+                    .map(|(part, centre)| part.signed_distance(&((p - centre) / part.body().size()).into()))
+                    .fold(f64::INFINITY, f64::min);
+                assert!(outside < 1e-9, "{p} {outside} {centres:?} {}", parts.len());
             }
         }
         assert!(inside > 100);

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use stereology::grid::write_atomically;
-use stereology::shape::{Particle, PeriodicBox};
+use stereology::shape::{BodyKind, Particle, PeriodicBox, UnitBody};
 
 use crate::failure::{Explain, Failure};
 
@@ -13,7 +13,7 @@ use crate::failure::{Explain, Failure};
 pub enum ParticleFormat {
     /// `shape,size,category,x,y,z,qw,qx,qy,qz`
     Csv,
-    /// Extended XYZ with the box as lattice; orientation x, y, z, w as OVITO wants it.
+    /// Extended XYZ with the box as lattice; orientation x, y, z, w and semi-axes of ellipsoids as OVITO wants them.
     Xyz,
     /// VTK poly data with a point a particle, for glyphs; orientation w, x, y, z.
     Vtp,
@@ -34,10 +34,16 @@ impl ParticleFormat {
     }
 
     /// Writes the particles, whole or not at all.
-    pub fn write(self, path: &Path, period: &PeriodicBox, particles: &[Particle]) -> Result<(), Failure> {
+    pub fn write(
+        self,
+        path: &Path,
+        bodies: &[UnitBody],
+        period: &PeriodicBox,
+        particles: &[Particle],
+    ) -> Result<(), Failure> {
         write_atomically(path, |out| match self {
             Self::Csv => csv(out, particles),
-            Self::Xyz => xyz(out, period, particles),
+            Self::Xyz => xyz(out, bodies, period, particles),
             Self::Vtp => vtp(out, particles),
         })
         .at(path)
@@ -59,12 +65,12 @@ fn csv(out: &mut impl Write, particles: &[Particle]) -> io::Result<()> {
     })
 }
 
-fn xyz(out: &mut impl Write, period: &PeriodicBox, particles: &[Particle]) -> io::Result<()> {
+fn xyz(out: &mut impl Write, bodies: &[UnitBody], period: &PeriodicBox, particles: &[Particle]) -> io::Result<()> {
     let sides = period.sides();
     writeln!(out, "{}", particles.len())?;
     writeln!(
         out,
-        "Lattice=\"{} 0 0 0 {} 0 0 0 {}\" Origin=\"0 0 0\" pbc=\"T T T\" Properties=species:S:1:pos:R:3:radius:R:1:orientation:R:4:category:I:1",
+        "Lattice=\"{} 0 0 0 {} 0 0 0 {}\" Origin=\"0 0 0\" pbc=\"T T T\" Properties=species:S:1:pos:R:3:radius:R:1:orientation:R:4:aspherical_shape:R:3:category:I:1",
         sides.x, sides.y, sides.z
     )?;
     particles.iter().try_for_each(|particle| {
@@ -72,9 +78,14 @@ fn xyz(out: &mut impl Write, period: &PeriodicBox, particles: &[Particle]) -> io
         let Particle {
             shape, size, category, ..
         } = particle;
+        let body = bodies[*shape].body();
+        let axes = match body.kind() {
+            BodyKind::Ellipsoid { semi_axes } => semi_axes.map(|axis| axis * size / body.size()),
+            _ => [size / 2.0; 3],
+        };
         writeln!(
             out,
-            "S{shape} {} {} {} {} {} {} {} {} {category}",
+            "S{shape} {} {} {} {} {} {} {} {} {} {} {} {category}",
             p.x,
             p.y,
             p.z,
@@ -82,7 +93,10 @@ fn xyz(out: &mut impl Write, period: &PeriodicBox, particles: &[Particle]) -> io
             q.i,
             q.j,
             q.k,
-            q.w
+            q.w,
+            axes[0],
+            axes[1],
+            axes[2]
         )
     })
 }
@@ -153,7 +167,7 @@ fn array(
 mod tests {
     use super::{csv, vtp, xyz};
     use nalgebra::{Point3, UnitQuaternion, Vector3};
-    use stereology::shape::{Particle, PeriodicBox};
+    use stereology::shape::{BodyKind, Particle, PeriodicBox, UnitBody};
 
     #[test]
     fn a_particle_in_each_format() {
@@ -173,10 +187,12 @@ mod tests {
             "shape,size,category,x,y,z,qw,qx,qy,qz\n0,1.5,2,1,2,3,1,0,0,0\n"
         );
         let mut out = Vec::new();
-        xyz(&mut out, &period, &[particle]).unwrap();
+        let ball = UnitBody::new(&Body::ellipsoid([1.0, 1.0, 0.5]).unwrap());
+        xyz(&mut out, &[ball], &period, &[particle]).unwrap();
         let out = text(out);
         assert!(
-            out.starts_with("1\nLattice=\"4 0 0 0 5 0 0 0 6\"") && out.ends_with("S0 1 2 3 0.75 0 0 0 1 2\n"),
+            out.starts_with("1\nLattice=\"4 0 0 0 5 0 0 0 6\"")
+                && out.ends_with("S0 1 2 3 0.75 0 0 0 1 0.75 0.75 0.375 2\n"),
             "{out}"
         );
         let mut out = Vec::new();

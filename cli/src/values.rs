@@ -205,6 +205,22 @@ impl FromStr for Triple {
     }
 }
 
+/// The sides of a box: one length for all, or three.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoxSides(pub [f64; 3]);
+
+impl FromStr for BoxSides {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match *text.split(',').map(positive).collect::<Result<Vec<_>, _>>()? {
+            [side] => Ok(Self([side; 3])),
+            [x, y, z] => Ok(Self([x, y, z])),
+            _ => Err("one length or three are needed, such as 20 or 20,20,40".to_owned()),
+        }
+    }
+}
+
 /// One, two or three numbers of samples: `N`, `H,W` or `NZ,NY,NX`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Extent(pub Vec<usize>);

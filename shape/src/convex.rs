@@ -22,8 +22,10 @@ pub(crate) fn half_spaces(hull: &TriangleMesh) -> Vec<Vector4<f64>> {
     });
     let mut used = vec![false; areas.len()];
     let mut faces = Vec::new();
+    // The normal of a sliver is rounding; left out, the body grows by less than its width.
+    let sliver = 1e-10 * reach * reach;
     for start in order {
-        if !used[start] && areas[start] != Vector3::zeros() {
+        if !used[start] && areas[start].norm() > sliver {
             faces.push(face_from(start, hull, &across, &areas, &mut used, 1e-9 * reach));
         }
     }

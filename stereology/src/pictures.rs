@@ -93,7 +93,10 @@ impl<'a> Owners<'a> {
         };
         for (i, particle) in particles.iter().enumerate() {
             let far = Vector3::repeat(reach(particle));
-            let (from, to) = (owners.cell_of(&(particle.position - far)), owners.cell_of(&(particle.position + far)));
+            let (from, to) = (
+                owners.cell_of(&(particle.position - far)),
+                owners.cell_of(&(particle.position + far)),
+            );
             for x in from[0]..=to[0] {
                 for y in from[1]..=to[1] {
                     for z in from[2]..=to[2] {

@@ -4,6 +4,7 @@ pub mod carve;
 pub mod export;
 pub mod kmatrix;
 pub mod pack;
+mod pack_quality;
 pub mod pyramid;
 pub mod render;
 pub mod segment;

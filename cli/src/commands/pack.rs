@@ -14,14 +14,15 @@ use stereology::shape::{PeriodicBox, UnitBody};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
+use crate::commands::pack_quality;
 use crate::density_table::read_densities;
 use crate::failure::{Explain, Failure, body};
 use crate::numbers::{percent, significant};
-use crate::outputs::check_file;
+use crate::outputs::{check_file, write_png, write_text};
 use crate::particle_files::ParticleFormat;
 use crate::profile_table::read_profiles;
 use crate::progress::{Step, go_on};
-use crate::values::{ShapeShare, count, positive, share, shares};
+use crate::values::{BoxSides, ShapeShare, count, positive, share, shares};
 
 /// Packs particles of given sizes into a box that repeats in x, y and z, until a separate pass certifies that none overlap
 ///
@@ -39,9 +40,9 @@ pub struct Pack {
     /// Number of particles [default: 1000]
     #[arg(long, value_name = "N", value_parser = count)]
     pub count: Option<usize>,
-    /// Side of the box, instead of --count
-    #[arg(long = "box", value_name = "L", value_parser = positive, conflicts_with = "count")]
-    pub side: Option<f64>,
+    /// Side of the box, or its three sides, instead of --count
+    #[arg(long = "box", value_name = "L[,L,L]", conflicts_with = "count")]
+    pub side: Option<BoxSides>,
     /// Fraction of the volume inside particles [default: what the densities say, otherwise 0.5]
     #[arg(long, value_name = "PHI", value_parser = share)]
     pub fraction: Option<f64>,
@@ -51,12 +52,30 @@ pub struct Pack {
     /// How overlaps are removed
     #[arg(long, value_enum, default_value_t = Mode::Fast)]
     pub mode: Mode,
+    /// What stands for meshes while they are packed; the certificate is always that of the meshes themselves
+    #[arg(long, value_enum, default_value_t = Proxy::Parts)]
+    pub proxy: Proxy,
+    /// By how much of its volume the convex parts of a shape that is not convex may exceed it, 0.005 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
+    pub tolerance: f64,
+    /// Give up after so many iterations; with --mode sequential, after so many places tried for one particle
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count)]
+    pub iterations: usize,
+    /// Judge the packing too: radial distribution, order, orientations, sections
+    #[arg(long)]
+    pub quality: bool,
     /// File for the packing (JSON)
     #[arg(short, long, value_name = "packing.json")]
     pub output: PathBuf,
     /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView); may be repeated
     #[arg(long, value_name = "FILE")]
     pub also: Vec<PathBuf>,
+    /// Also draw the packing (PNG)
+    #[arg(long, value_name = "PNG")]
+    pub picture: Option<PathBuf>,
+    /// Also write the energy of the overlaps at each iteration (CSV)
+    #[arg(long, value_name = "CSV")]
+    pub trace: Option<PathBuf>,
 }
 
 /// Where sizes come from.
@@ -80,32 +99,51 @@ pub struct Sizes {
 /// How overlaps are removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
-    /// Overlap energy minimised by FIRE
+    /// Descent with momentum on the energy of overlaps
     Fast,
     /// The paper's relaxation
     Paper,
-    /// Simulated annealing (not available yet)
+    /// Simulated annealing: shifts, turns, swaps and re-insertions while it cools, then a quench
     Anneal,
-    /// One particle at a time at random (not available yet)
+    /// One particle at a time at random, the largest first; jams at about 0.35
     Sequential,
 }
 
 impl Mode {
-    /// The way of packing.
-    pub fn way(self) -> Result<anneal::Mode, Failure> {
+    fn name(self) -> &'static str {
         match self {
-            Self::Fast => Ok(anneal::Mode::Fast),
-            Self::Paper => Ok(anneal::Mode::Paper),
-            Self::Anneal => Err(Failure::not_available("--mode anneal")),
-            Self::Sequential => Err(Failure::not_available("--mode sequential")),
+            Self::Fast => "fast",
+            Self::Paper => "paper",
+            Self::Anneal => "anneal",
+            Self::Sequential => "sequential",
         }
     }
+
+    /// The way of packing.
+    pub fn way(self) -> anneal::Mode {
+        match self {
+            Self::Fast => anneal::Mode::Fast,
+            Self::Paper => anneal::Mode::Paper,
+            Self::Anneal => anneal::Mode::Anneal,
+            Self::Sequential => anneal::Mode::Sequential,
+        }
+    }
+}
+
+/// What stands for meshes while they are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Proxy {
+    /// Themselves, or their convex parts
+    Parts,
+    /// Their convex hulls
+    Hull,
+    /// Outlines of 26 planes
+    Outline,
 }
 
 /// What a failed packing means for the program's user.
 pub fn pack_failure(error: PackError) -> Failure {
     match error {
-        PackError::NotConvex { .. } => Failure::not_available("packing of shapes that are not convex"),
         PackError::Cancelled => Failure::stopped(),
         other => Failure::run(other),
     }
@@ -118,12 +156,43 @@ struct Shapes {
     bodies: Vec<UnitBody>,
 }
 
+/// What is packed, and into which box.
+struct Population {
+    grains: Vec<Grain>,
+    period: PeriodicBox,
+    /// What the densities expect in the box, before rounding to whole particles.
+    expected: Option<f64>,
+}
+
+impl Population {
+    fn listed(grains: Vec<Grain>, period: PeriodicBox) -> Self {
+        Self {
+            grains,
+            period,
+            expected: None,
+        }
+    }
+}
+
 impl Pack {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = PackOptions::default()
-            .with_mode(self.mode.way()?)
+            .with_mode(self.mode.way())
+            .with_proxy(match self.proxy {
+                Proxy::Parts => anneal::Proxy::Parts,
+                Proxy::Hull => anneal::Proxy::Hull,
+                Proxy::Outline => anneal::Proxy::Outline,
+            })
+            .with_tolerance(self.tolerance)
+            .with_iterations(self.iterations)
             .with_seed(everywhere.seed);
+        if !(0.005..=1.0).contains(&self.tolerance) {
+            return Err(Failure::usage("--tolerance: a share from 0.005 to 1 is needed"));
+        }
         check_file(&self.output, everywhere.force)?;
+        for path in self.picture.iter().chain(&self.trace) {
+            check_file(path, everywhere.force)?;
+        }
         let also = self
             .also
             .iter()
@@ -134,7 +203,11 @@ impl Pack {
         }
         let started = Instant::now();
         let Shapes { names, shares, bodies } = self.shapes()?;
-        let (grains, period) = self.grains(&bodies, &shares, everywhere)?;
+        let Population {
+            grains,
+            period,
+            expected,
+        } = self.grains(&bodies, &shares, everywhere)?;
         let requested = total_volume(&bodies, &grains).or_fail()? / period.volume();
         let step = Step::begin("packing", everywhere.quiet);
         let progress = |done: f64| step.at(done);
@@ -149,7 +222,13 @@ impl Pack {
         drop(step);
         go_on()?;
         for (path, format) in also {
-            format.write(path, &period, packing.particles())?;
+            format.write(path, packing.bodies(), &period, packing.particles())?;
+        }
+        if let Some(path) = &self.picture {
+            write_png(path, &pack_quality::picture(&packing).or_fail()?)?;
+        }
+        if let Some(path) = &self.trace {
+            write_text(path, &pack_quality::trace(&packing))?;
         }
         PackingFile::new(names, packing.particles(), packing.period())
             .write(&self.output)
@@ -165,6 +244,8 @@ impl Pack {
             .field("max_overlap", packing.max_overlap())
             .field("certified", packing.max_overlap() <= 0.0)
             .field("iterations", packing.iterations())
+            .field("mode", self.mode.name())
+            .field("final_energy", packing.energies().last().copied())
             .seconds(started.elapsed().as_secs_f64())
             .line(format!(
                 "{} particles in a box of {}",
@@ -180,6 +261,15 @@ impl Pack {
                 packing.iterations(),
                 significant(started.elapsed().as_secs_f64())
             ));
+        if let Some(expected) = expected {
+            answer.field("expected_particles", expected).line(format!(
+                "{} expected from the densities; numbers above every bin edge are rounded to whole particles",
+                significant(expected)
+            ));
+        }
+        if self.quality {
+            pack_quality::judge(&packing, everywhere.seed, &mut answer);
+        }
         Ok(answer)
     }
 
@@ -204,19 +294,14 @@ impl Pack {
     }
 
     /// The particles' sizes, shapes and categories, and their box.
-    fn grains(
-        &self,
-        bodies: &[UnitBody],
-        shares: &[f64],
-        everywhere: &Everywhere,
-    ) -> Result<(Vec<Grain>, PeriodicBox), Failure> {
+    fn grains(&self, bodies: &[UnitBody], shares: &[f64], everywhere: &Everywhere) -> Result<Population, Failure> {
         let seed = everywhere.seed;
         let scale = everywhere.scale;
         if let Some(table) = &self.sizes.densities {
             return self.grains_of_table(table, bodies, shares, everywhere);
         }
         let fraction = self.fraction.unwrap_or(0.5);
-        let cube = |side: f64| PeriodicBox::new(Vector3::repeat(side * scale)).or_usage("--box");
+        let cube = |side: BoxSides| PeriodicBox::new(Vector3::from(side.0) * scale).or_usage("--box");
         if let Some(table) = &self.sizes.sizes {
             if self.count.is_some() {
                 return Err(Failure::usage(
@@ -251,7 +336,7 @@ impl Pack {
                 }
                 (None, _) => box_for_fraction(bodies, &grains, fraction).or_fail()?,
             };
-            return Ok((grains, period));
+            return Ok(Population::listed(grains, period));
         }
         let sizes = |count: usize| match self.sizes.lognormal {
             Some(sigma) => lognormal_sizes(count, sigma, seed).or_fail(),
@@ -264,14 +349,14 @@ impl Pack {
         let Some(side) = self.side else {
             let grains = grains(self.count.unwrap_or(1000))?;
             let period = box_for_fraction(bodies, &grains, fraction).or_fail()?;
-            return Ok((grains, period));
+            return Ok(Population::listed(grains, period));
         };
         let period = cube(side)?;
         let count = count_to_fill(bodies, &grains(1000)?, &period, fraction).or_fail()?;
         let mut grains = grains(count)?;
         // Whole particles fill a given box only nearly; their sizes take up the rest, all by one factor.
         scale_to_fraction(bodies, &mut grains, &period, fraction).or_fail()?;
-        Ok((grains, period))
+        Ok(Population::listed(grains, period))
     }
 
     fn grains_of_table(
@@ -280,7 +365,7 @@ impl Pack {
         bodies: &[UnitBody],
         shares: &[f64],
         everywhere: &Everywhere,
-    ) -> Result<(Vec<Grain>, PeriodicBox), Failure> {
+    ) -> Result<Population, Failure> {
         let mut histograms = Vec::new();
         for histogram in read_densities(table)? {
             match histogram.shape {
@@ -300,7 +385,7 @@ impl Pack {
             .flat_map(|(_, histogram)| &histogram.number_density)
             .sum();
         let volume = match self.side {
-            Some(side) => side.powi(3),
+            Some(BoxSides(sides)) => sides.iter().product(),
             None => self.count.unwrap_or(1000) as f64 / total,
         };
         let densities: Vec<SizeDensities<'_>> = histograms
@@ -322,14 +407,19 @@ impl Pack {
         let period = match (self.side, self.fraction) {
             (None, Some(fraction)) => box_for_fraction(bodies, &grains, fraction).or_fail()?,
             (side, fraction) => {
-                let period = PeriodicBox::new(Vector3::repeat(side.unwrap_or(volume.cbrt()))).or_usage("--box")?;
+                let sides = side.map_or([volume.cbrt(); 3], |side| side.0);
+                let period = PeriodicBox::new(Vector3::from(sides)).or_usage("--box")?;
                 if let Some(fraction) = fraction {
                     scale_to_fraction(bodies, &mut grains, &period, fraction).or_fail()?;
                 }
                 period
             }
         };
-        Ok((grains, period))
+        Ok(Population {
+            grains,
+            period,
+            expected: Some(total * volume),
+        })
     }
 }
 

@@ -51,7 +51,6 @@ fn what_is_not_built_says_so() {
         &["contact", "a.png", "--json"],
         &["displace"],
         &["explore"],
-        &["pack", "--constant", "--mode", "anneal", "-o", "a.json"],
         &["texture", "a.png", "--mode", "oriented", "--size", "8", "-o", "a.npy"],
     ] {
         let (code, _, error) = stereology(later);

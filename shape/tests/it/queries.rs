@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody, convex_hull};
 
 use crate::random_shapes::{directions, fat_l, hollow_cube, points, polytopes, torus};
 
@@ -134,4 +134,25 @@ fn the_centroid_of_a_torus_is_outside() {
     let body = unit(torus());
     assert!(!body.contains(&Point3::origin()));
     assert_eq!(body.inscribed_radius(), 0.0);
+}
+
+/// Points along the edges of a turned cube lie off them by rounding, so its hull has slivers; their normals, which are noise, must cut nothing off.
+#[test]
+fn slivers_cut_nothing_off() {
+    let turn = nalgebra::Rotation3::from_euler_angles(0.3, 0.5, 0.7);
+    let corner = |k: usize| Vector3::new(k & 1, k >> 1 & 1, k >> 2).map(|x| x as f64 - 0.5);
+    let mut points = Vec::new();
+    for k in 0..8_usize {
+        points.push(Point3::from(turn * corner(k)));
+        for axis in 0..3 {
+            let (from, to) = (turn * corner(k), turn * corner(k ^ (1 << axis)));
+            points.extend((1..7).map(|step| Point3::from(from + (to - from) * (f64::from(step) / 7.3))));
+        }
+    }
+    let hull = UnitBody::new(&Body::from_mesh(convex_hull(&points).unwrap()));
+    let size = hull.body().size();
+    for k in 0..8 {
+        let near = Point3::from(turn * corner(k) * (0.999 / size));
+        assert!(hull.contains(&near) && hull.signed_distance(&near) < 0.0, "corner {k}");
+    }
 }

@@ -5,6 +5,7 @@ mod density_recovery;
 mod estimators;
 mod grain_size_tools;
 mod particles;
+mod packings;
 mod section_likelihood;
 mod solids;
 mod sphere_samples;
@@ -17,7 +18,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 12] = [
+    let figures: [(&str, Figure); 13] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -29,6 +30,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("estimators", estimators::draw_errors),
         ("coverage", estimators::draw_coverage),
         ("figure-09-particles", particles::draw_shapes),
+        ("packing", packings::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

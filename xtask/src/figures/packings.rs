@@ -1,0 +1,212 @@
+//! The ways of packing compared: a picture each, and their radial distributions.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Result, anyhow};
+use plotters::prelude::*;
+use stereology::anneal::{
+    Distance, Mode, PackOptions, Packing, RadialDistribution, bond_order, box_for_fraction, equilibrate,
+    lognormal_sizes, mix, pack, populate, radial_distribution,
+};
+use stereology::pictures::picture_of_packing;
+use stereology::render::RenderOptions;
+use stereology::shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+
+use super::bars::{BLUE, GREEN, RED, table};
+
+const COUNT: usize = 1000;
+const SIGMA: f64 = 0.3;
+const FRACTION: f64 = 0.35;
+const OCHRE: RGBColor = RGBColor(190, 140, 40);
+const GREY: RGBColor = RGBColor(120, 120, 120);
+
+pub fn draw(folder: &Path) -> Result<()> {
+    let modes = [
+        ("fast", Mode::Fast, BLUE),
+        ("paper", Mode::Paper, RED),
+        ("anneal", Mode::Anneal, GREEN),
+        ("sequential", Mode::Sequential, OCHRE),
+    ];
+    let sphere = [UnitBody::new(&Body::sphere(1.0)?)];
+    let mut curves = Vec::new();
+    let mut rows = Vec::new();
+    for (name, mode, colour) in modes {
+        let options = PackOptions::default().with_mode(mode);
+        let started = Instant::now();
+        let packing = packed(&sphere, COUNT, FRACTION, &options)?;
+        // Times are told, not written: the same program draws the same files.
+        println!("  {name}: {:.2} s", started.elapsed().as_secs_f64());
+        picture(&packing, &folder.join(format!("packing-{name}.png")))?;
+        rows.push(judged(name, &packing));
+        curves.push((name, radial(&packing), colour));
+        if mode == Mode::Fast {
+            let later = equilibrate(&packing, 300, 0, &|_| ControlFlow::Continue(()))?;
+            rows.push(judged("equilibrium", &later));
+            curves.push(("equilibrium", radial(&later), GREY));
+        }
+    }
+    lines(&folder.join("packing-radial.svg"), &curves)?;
+    table(
+        &folder.join("packing.csv"),
+        &[
+            "mode",
+            "fraction",
+            "iterations",
+            "g_at_contact",
+            "g_below_1.05",
+            "q6",
+            "bonds",
+        ],
+        &rows,
+    )?;
+    let hollow = [
+        TriangleMesh::torus(2.0, 0.7, 32, 16),
+        bars(&[
+            [0, 0, 0],
+            [1, 0, 0],
+            [2, 0, 0],
+            [0, 1, 0],
+            [2, 1, 0],
+            [0, 2, 0],
+            [2, 2, 0],
+        ]),
+        bars(&[
+            [2, 2, 2],
+            [0, 2, 2],
+            [1, 2, 2],
+            [3, 2, 2],
+            [4, 2, 2],
+            [2, 0, 2],
+            [2, 1, 2],
+            [2, 3, 2],
+            [2, 4, 2],
+            [2, 2, 0],
+            [2, 2, 1],
+            [2, 2, 3],
+            [2, 2, 4],
+        ]),
+    ];
+    let bodies = hollow
+        .into_iter()
+        .map(|mesh| Ok(UnitBody::new(&Body::from_mesh(ClosedMesh::try_from(mesh)?))))
+        .collect::<Result<Vec<_>>>()?;
+    let started = Instant::now();
+    let packing = packed(&bodies, 300, 0.2, &PackOptions::default())?;
+    println!("  hollow: {:.2} s", started.elapsed().as_secs_f64());
+    picture(&packing, &folder.join("packing-hollow.png"))
+}
+
+fn packed(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOptions) -> Result<Packing> {
+    let shares = vec![1.0; bodies.len()];
+    let grains = mix(&lognormal_sizes(count, SIGMA, 0)?, &shares, 0)?;
+    let period = box_for_fraction(bodies, &grains, fraction)?;
+    Ok(pack(bodies, populate(&grains, &period, 0), &period, options, &|_| {
+        ControlFlow::Continue(())
+    })?)
+}
+
+fn radial(packing: &Packing) -> RadialDistribution {
+    radial_distribution(packing.particles(), packing.period(), Distance::Contacts, 2.5, 50)
+}
+
+fn judged(name: &str, packing: &Packing) -> Vec<String> {
+    let order = bond_order(packing.particles(), packing.period(), 1.4);
+    let radial = radial_distribution(packing.particles(), packing.period(), Distance::Contacts, 2.5, 50);
+    let near = radial.edges.iter().position(|edge| *edge > 1.0 + 1e-9).unwrap_or(0);
+    vec![
+        name.to_owned(),
+        format!("{:.4}", packing.fraction()),
+        packing.iterations().to_string(),
+        radial.at_contact().map_or(String::new(), |g| format!("{g:.2}")),
+        format!("{:.2}", radial.g[near]),
+        format!("{:.4}", order.global),
+        order.bonds.to_string(),
+    ]
+}
+
+fn picture(packing: &Packing, path: &Path) -> Result<()> {
+    const COLOURS: [[f32; 3]; 3] = [[0.74, 0.45, 0.30], [0.35, 0.50, 0.66], [0.60, 0.62, 0.40]];
+    let colour = |i: usize| {
+        let shade = 0.82 + 0.36 * (i as f32 * 0.618_034).fract();
+        let base = COLOURS[packing.particles()[i].shape % COLOURS.len()];
+        base.map(|channel| (channel * shade).min(1.0))
+    };
+    let options = RenderOptions {
+        gloss: 0.15,
+        ..RenderOptions::default().with_size(420, 380)
+    };
+    Ok(picture_of_packing(packing, &colour, &options)?.save(path)?)
+}
+
+fn lines(path: &Path, curves: &[(&str, RadialDistribution, RGBColor)]) -> Result<()> {
+    let root = SVGBackend::new(path, (760, 420)).into_drawing_area();
+    let highest = curves
+        .iter()
+        .flat_map(|(_, radial, _)| &radial.g)
+        .fold(1.0_f64, |h, g| h.max(*g));
+    let drawing = || -> Result<(), Box<dyn std::error::Error>> {
+        root.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(12)
+            .x_label_area_size(36)
+            .y_label_area_size(44)
+            .build_cartesian_2d(0.5..2.5, 0.0..1.05 * highest)?;
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE)
+            .x_desc("distance of centres over the mean of the two sizes")
+            .y_desc("g")
+            .draw()?;
+        for (name, radial, colour) in curves {
+            let width = radial.edges[0];
+            let points = radial
+                .edges
+                .iter()
+                .zip(&radial.g)
+                .map(|(edge, g)| (edge - 0.5 * width, *g));
+            let colour = *colour;
+            chart
+                .draw_series(LineSeries::new(points.filter(|p| p.0 > 0.5), colour.stroke_width(2)))?
+                .label(*name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(2)));
+        }
+        chart.configure_series_labels().background_style(WHITE).draw()?;
+        root.present()?;
+        Ok(())
+    };
+    drawing().map_err(|error| anyhow!("{}: {error}", path.display()))
+}
+
+/// The surface of unit cubes that share faces.
+fn bars(cubes: &[[i32; 3]]) -> TriangleMesh {
+    let mut mesh = TriangleMesh {
+        vertices: Vec::new(),
+        triangles: Vec::new(),
+    };
+    for cube in cubes {
+        for axis in 0..3 {
+            for (side, beside) in [(0, -1), (1, 1)] {
+                let mut next = *cube;
+                next[axis] += beside;
+                if cubes.contains(&next) {
+                    continue;
+                }
+                let first = mesh.vertices.len() as u32;
+                for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                    let mut corner = cube.map(f64::from);
+                    corner[axis] += f64::from(side);
+                    corner[(axis + 1) % 3] += f64::from(u);
+                    corner[(axis + 2) % 3] += f64::from(v);
+                    mesh.vertices.push(corner.into());
+                }
+                let corners = if side == 1 { [[1, 2], [2, 3]] } else { [[2, 1], [3, 2]] };
+                mesh.triangles
+                    .extend(corners.map(|[p, q]| [first, first + p, first + q]));
+            }
+        }
+    }
+    mesh.weld();
+    mesh
+}

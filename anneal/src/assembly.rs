@@ -149,7 +149,12 @@ impl<'a> Assembly<'a> {
         }))
     }
 
-    /// Whether all stand for themselves as one convex solid.
+    /// Whether some bodies have hollows that others can be caught in.
+    pub(crate) fn can_entangle(&self) -> bool {
+        !self.round && self.stand_ins.iter().any(|stand_in| stand_in.parts.len() > 1)
+    }
+
+    /// Whether a particle is one convex solid that stands for itself.
     pub(crate) fn single(&self, i: usize) -> bool {
         self.parts(i).is_empty()
     }

@@ -13,11 +13,12 @@
 use crate::assembly::Assembly;
 use crate::contacts::{Memory, Overlaps};
 use crate::neighbours::Neighbours;
+use crate::one_by_one::{OneByOne, anywhere};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
-use stereology_shape::PeriodicBox;
+use stereology_shape::{PeriodicBox, isotropic_rotation};
 
 /// How a relaxation ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +50,9 @@ const SHORTEST_STEP: f64 = 0.15;
 const STRIDE: f64 = 0.2;
 /// Progress is judged after so many iterations.
 const WATCH: usize = 100;
+/// How often entangled particles are taken elsewhere.
+const RESCUES: u64 = 30;
+const RESCUE_STREAM: u64 = 1 << 20;
 /// An overlap of this part of a pair's width that does not yield.
 const HOPELESS: f64 = 0.03;
 
@@ -64,6 +68,7 @@ pub(crate) fn relax(
     let mut nearby = Nearby::new(assembly, period, limits.swelling);
     let mut overlaps = Overlaps::default();
     let mut shakes = 0;
+    let mut rescues = 0;
     let mut before = f64::INFINITY;
     let mut swelling = limits.swelling;
     for iteration in 0..limits.iterations {
@@ -79,7 +84,18 @@ pub(crate) fn relax(
         if iteration % WATCH == WATCH - 1 {
             // Shaking loosens particles that hold each other by a little; deep overlaps that stay mean that there is no room.
             let hopeless = overlaps.worst > HOPELESS;
-            let patience = if hopeless { 4 * WATCH } else { 10 * WATCH };
+            let patience = match (assembly.can_entangle(), hopeless) {
+                (true, _) => WATCH,
+                (false, true) => 4 * WATCH,
+                (false, false) => 10 * WATCH,
+            };
+            if overlaps.energy > 0.9 * before && motion.age > patience && assembly.can_entangle() && rescues < RESCUES {
+                rescues += 1;
+                rescue(assembly, period, &overlaps, swelling, limits.seed, rescues);
+                motion = Motion::new(assembly);
+                before = f64::INFINITY;
+                continue;
+            }
             if overlaps.energy > 0.98 * before && motion.age > patience {
                 if hopeless || shakes == limits.shakes {
                     return End::Stuck;
@@ -99,6 +115,45 @@ pub(crate) fn relax(
         motion.advance(assembly, &overlaps);
     }
     End::Stuck
+}
+
+/// Takes the smaller one of every pair that overlaps about as much as any to the best of many places drawn anywhere.
+///
+/// Rings that are linked, but too thick for each other, can only be parted so.
+fn rescue(
+    assembly: &mut Assembly<'_>,
+    period: &PeriodicBox,
+    overlaps: &Overlaps,
+    swelling: f64,
+    seed: u64,
+    number: u64,
+) {
+    const PLACES: usize = 100;
+    let deepest = overlaps.pushes().map(|push| push.force.norm()).fold(0.0, f64::max);
+    let mut trapped: Vec<usize> = overlaps
+        .pushes()
+        .filter(|push| push.force.norm() > 0.5 * deepest)
+        .map(|push| (push.a as usize, push.b as usize))
+        .map(|(a, b)| if assembly.radius[a] < assembly.radius[b] { a } else { b })
+        .collect();
+    trapped.sort_unstable();
+    trapped.dedup();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(RESCUE_STREAM + number);
+    let mut bodies = OneByOne::full(assembly, period, swelling);
+    for i in trapped {
+        let mut best = (f64::INFINITY, bodies.assembly.pose(i));
+        for _ in 0..PLACES {
+            let centre = anywhere(&mut rng, period);
+            bodies.try_pose(i, centre, isotropic_rotation(&mut rng));
+            let energy = bodies.energy(i);
+            if energy < best.0 {
+                best = (energy, bodies.assembly.pose(i));
+            }
+        }
+        bodies.assembly.set_pose(i, best.1);
+        bodies.settle(i);
+    }
 }
 
 /// Moves and turns every particle a little at random.

@@ -171,6 +171,9 @@ pub fn pack(
         .iter()
         .map(|body| StandIn::of(body, options.proxy, options.tolerance))
         .collect();
+    // Neighbours in space are neighbours in memory.
+    let order = along_a_curve(&particles, period);
+    let particles = order.iter().map(|&i| particles[i]).collect();
     let mut assembly = Assembly::new(bodies, &stand_ins, particles, period);
     let mut tries = 0;
     let end = match options.mode {
@@ -205,7 +208,11 @@ pub fn pack(
     if end == End::Cancelled {
         return Err(PackError::Cancelled);
     }
-    let particles = assembly.into_particles(period);
+    let moved = assembly.into_particles(period);
+    let mut particles = moved.clone();
+    for (particle, i) in moved.into_iter().zip(order) {
+        particles[i] = particle;
+    }
     match Packing::verify(bodies, particles.clone(), period) {
         Ok(packing) => {
             // Nothing is left to cancel; a caller who breaks now has the packing all the same.
@@ -245,6 +252,20 @@ fn refuse_the_impossible(bodies: &[UnitBody], particles: &[Particle], period: &P
     } else {
         Ok(fraction)
     }
+}
+
+/// The order in which a Z-curve through the box meets the particles (Morton 1966).
+fn along_a_curve(particles: &[Particle], period: &PeriodicBox) -> Vec<usize> {
+    const CELLS: f64 = 1024.0;
+    let spread = |cell: u64| (0..10).fold(0, |sum, bit| sum | (cell >> bit & 1) << (3 * bit));
+    let key = |particle: &Particle| {
+        let at = period.wrap(&particle.position).coords.component_div(&period.sides()) * CELLS;
+        let [x, y, z] = [at.x, at.y, at.z].map(|x| spread(x as u64));
+        x | y << 1 | z << 2
+    };
+    let mut order: Vec<(u64, usize)> = particles.iter().map(key).zip(0..).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(_, i)| i).collect()
 }
 
 /// Swelling takes a third of the room that is left below the density of a random close packing.

@@ -36,6 +36,44 @@ fn ring() -> UnitBody {
     UnitBody::new(&Body::from_mesh(mesh))
 }
 
+/// Three crossed bars of 5 x 1 x 1: the faces of thirteen cubes that no two share.
+fn jack() -> UnitBody {
+    let mut mesh = TriangleMesh {
+        vertices: Vec::new(),
+        triangles: Vec::new(),
+    };
+    let inside = |cube: [i32; 3]| {
+        let off = cube.iter().filter(|&&x| x != 2).count();
+        off <= 1 && cube.iter().all(|x| (0..5).contains(x))
+    };
+    for k in 0..125 {
+        let cube = [k % 5, k / 5 % 5, k / 25];
+        for (axis, step) in [(0, 1), (1, 1), (2, 1), (0, -1), (1, -1), (2, -1)] {
+            let mut beside = cube;
+            beside[axis] += step;
+            if !inside(cube) || inside(beside) {
+                continue;
+            }
+            let first = mesh.vertices.len() as u32;
+            for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
+                let mut corner = cube;
+                corner[axis] += (step + 1) / 2;
+                corner[(axis + 1) % 3] += u;
+                corner[(axis + 2) % 3] += v;
+                mesh.vertices.push(Point3::from(corner.map(f64::from)));
+            }
+            let faces = if step > 0 {
+                [[0, 1, 2], [0, 2, 3]]
+            } else {
+                [[0, 2, 1], [0, 3, 2]]
+            };
+            mesh.triangles.extend(faces.map(|face| face.map(|v| first + v)));
+        }
+    }
+    mesh.weld();
+    UnitBody::new(&Body::from_mesh(ClosedMesh::try_from(mesh).unwrap()))
+}
+
 fn at(shape: usize, size: f64, position: Vector3<f64>) -> Particle {
     Particle {
         shape,
@@ -51,6 +89,11 @@ fn a_bracket_is_two_boxes_and_a_box_is_one() {
     let parts = ConvexParts::of(&bracket(), 0.01);
     assert_eq!(parts.hulls().len(), 2);
     assert!(parts.excess() < 1e-9);
+    // Three crossed bars: seven boxes or fewer, the middle one, which has no surface of its own, among them.
+    let parts = ConvexParts::of(&jack(), 0.01);
+    let volume: f64 = parts.hulls().iter().map(ClosedMesh::volume).sum();
+    assert!((volume / jack().volume() - 1.0).abs() < 1e-9 && parts.excess() < 1e-9);
+    assert!(parts.hulls().len() <= 7, "{}", parts.hulls().len());
     let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
     assert_eq!(ConvexParts::of(&cube, 0.01).hulls().len(), 1);
     assert!(
@@ -173,4 +216,19 @@ proptest! {
             prop_assert!(overlap.depth < 0.15, "{:?}", overlap);
         }
     }
+}
+
+/// Rings dropped on one another link; those too thick to be linked are taken elsewhere, not left as a failure.
+#[test]
+fn linked_rings_too_thick_for_each_other_are_freed() {
+    let thick = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 16, 8)).unwrap();
+    let bodies = [UnitBody::new(&Body::from_mesh(thick))];
+    let grains = mix(&lognormal_sizes(120, 0.4, 2).unwrap(), &[1.0], 2).unwrap();
+    let period = box_for_fraction(&bodies, &grains, 0.2).unwrap();
+    let start = populate(&grains, &period, 2);
+    let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert!((packing.fraction() - 0.2).abs() < 1e-9);
 }

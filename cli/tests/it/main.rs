@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod contract;
+mod packings;
 mod small_commands;
 mod solid;
 

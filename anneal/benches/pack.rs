@@ -96,7 +96,7 @@ fn qualities(c: &mut Criterion) {
         b.iter(|| radial_distribution(black_box(particles), &period, Distance::Contacts, 3.0, 60));
     });
     group.bench_function("bond_order 1000", |b| {
-        b.iter(|| bond_order(black_box(particles), &period, 1.4))
+        b.iter(|| bond_order(black_box(particles), &period, 1.4));
     });
     group.bench_function("section_test 1000, 10 replicates", |b| {
         b.iter(|| section_test(black_box(&packing), 5, 10, 0));

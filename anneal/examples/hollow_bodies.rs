@@ -83,7 +83,7 @@ fn cells(cubes: &[[i32; 3]]) -> TriangleMesh {
                 if cubes.contains(&next) {
                     continue;
                 }
-                let first = mesh.vertices.len() as u32;
+                let first = u32::try_from(mesh.vertices.len()).unwrap_or(u32::MAX);
                 for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
                     let mut corner = Vector3::from(cube.map(f64::from));
                     corner[axis] += f64::from(side);

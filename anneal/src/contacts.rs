@@ -72,6 +72,9 @@ const BLOCK: usize = 256;
 /// Below this many bodies a second thread costs more than it saves.
 const ALONE: usize = 2 * BLOCK;
 
+/// Told of a pair of solids: from the centres of their particles to theirs, and their gauge.
+type Contact<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>, &Gauge) + 'a;
+
 impl Assembly<'_> {
     /// Energy of one pair, `b` displaced by `shift`, at sizes times `swelling`; 0 if it is proved apart.
     pub(crate) fn pair_energy(&self, a: usize, b: usize, shift: &Vector3<f64>, swelling: f64) -> f64 {
@@ -102,7 +105,7 @@ impl Assembly<'_> {
         offset: &Vector3<f64>,
         swelling: f64,
         enough: f64,
-        visit: &mut dyn FnMut(&Vector3<f64>, &Vector3<f64>, &Gauge),
+        visit: &mut Contact<'_>,
     ) -> f64 {
         let search = Search {
             enough,

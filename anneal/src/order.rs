@@ -167,12 +167,12 @@ impl Harmonics {
         let (mut re, mut im) = (1.0, 0.0);
         // (6 − m)! / (6 + m)!
         let mut ratio = 1.0;
-        for m in 0..7 {
+        for (m, legendre) in legendre.into_iter().enumerate() {
             if m > 0 {
                 (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
                 ratio /= (6 + m) as f64 * (7 - m) as f64;
             }
-            let scale = legendre[m] * f64::sqrt(ratio);
+            let scale = legendre * f64::sqrt(ratio);
             (sum.re[m], sum.im[m]) = (scale * re, scale * im);
         }
         sum

@@ -65,7 +65,7 @@ impl Part {
     fn new(hull: &ClosedMesh) -> Self {
         let centre = hull.centroid().coords;
         let points: Vec<Vector3<f64>> = hull.vertices().iter().map(|v| v.coords - centre).collect();
-        let reach = points.iter().map(|p| p.norm()).fold(0.0, f64::max);
+        let reach = points.iter().map(Vector3::norm).fold(0.0, f64::max);
         Self { centre, points, reach }
     }
 }

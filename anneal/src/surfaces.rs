@@ -134,7 +134,7 @@ impl<'a> Placed<'a> {
         matches!(self.body.body().kind(), BodyKind::Sphere { .. })
     }
 
-    fn to_local(&self, p: &Vector3<f64>) -> Point3<f64> {
+    fn to_local(self, p: &Vector3<f64>) -> Point3<f64> {
         Point3::from(self.rotation.tr_mul(p) / self.size)
     }
 }
@@ -160,7 +160,7 @@ fn in_the_way(mesh: &Placed<'_>, sphere: &Placed<'_>, offset: &Vector3<f64>) -> 
     let distance = mesh.body.signed_distance(&mesh.to_local(offset)) * mesh.size;
     let radius = 0.5 * sphere.size;
     let allowance = ROUNDING * (mesh.size * mesh.body.bounding_radius() + radius);
-    (distance < radius - allowance).then(|| radius - distance)
+    (distance < radius - allowance).then_some(radius - distance)
 }
 
 fn with_ellipsoid(mesh: &Placed<'_>, surface: &Surface, round: &Placed<'_>, offset: &Vector3<f64>) -> Option<f64> {

@@ -54,7 +54,7 @@ fn jack() -> UnitBody {
             if !inside(cube) || inside(beside) {
                 continue;
             }
-            let first = mesh.vertices.len() as u32;
+            let first = u32::try_from(mesh.vertices.len()).unwrap();
             for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
                 let mut corner = cube;
                 corner[axis] += (step + 1) / 2;

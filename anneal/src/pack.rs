@@ -115,7 +115,7 @@ pub struct Jam {
 /// are not spheres start with up to a hundred iterations as spheres of their volumes. Sizes are swollen by half a percent or so meanwhile: then overlaps at
 /// true size vanish altogether in finite time. The same bits at any number of threads.
 ///
-/// Measured (seconds of one core): 1,000 spheres, lognormal σ .3, at .60 / .64: .02 / .04; 10,000: .26 / .52; 100,000 at .60 4.9; rocks of about 20 vertices: 1,000 at .5
+/// Measured (seconds of one core): 1,000 spheres, lognormal σ .3, at .60 / .64: .02 / .04; 10,000: .22 / .45; 100,000 at .60 2.6; rocks of about 20 vertices: 1,000 at .5
 /// .12, 5,000 at .5 .74; ellipsoids 1,000 at .5 .09; 5:1 rods 300 at .3 .17. [`Mode::Paper`]: 1,000 spheres at .6 1.5.
 ///
 /// # Progress

@@ -167,7 +167,7 @@ fn array(
 mod tests {
     use super::{csv, vtp, xyz};
     use nalgebra::{Point3, UnitQuaternion, Vector3};
-    use stereology::shape::{BodyKind, Particle, PeriodicBox, UnitBody};
+    use stereology::shape::{Body, Particle, PeriodicBox, UnitBody};
 
     #[test]
     fn a_particle_in_each_format() {

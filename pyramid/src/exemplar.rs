@@ -1,18 +1,16 @@
-//! An exemplar and the statistics that its texture is made of.
+//! Exemplars: pictures of textures, checked and taken apart into colour components.
 
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use rayon::prelude::*;
 use stereology_spectrum::{
-    Complex, RadialSpectrum, RealFft, frequency, masked_autocovariance, periodic_component, radial_spectrum,
+    RadialSpectrum, RealFft, frequency, masked_autocovariance, periodic_component, radial_spectrum,
 };
 
-use crate::bank::FilterBank;
 use crate::fill::fill_outside;
-use crate::filters::{high_pass, low_pass};
-use crate::{Finding, PrincipalColours, Quantiles, TextureError};
+use crate::{Edges, PrincipalColours, Quantiles, TextureError};
 
 /// Fewest pixels that statistics are taken from.
-const FEWEST_PIXELS: usize = 64;
+pub(crate) const FEWEST_PIXELS: usize = 64;
 /// Quantiles kept of a band or channel: beyond, they say nothing new.
 const QUANTILES: usize = 1 << 16;
 /// Samples of a pool that are sorted; larger pools are thinned out evenly.
@@ -46,90 +44,100 @@ impl<'a> Exemplar<'a> {
     }
 }
 
-/// An exemplar that was checked, made periodic and taken apart into colour components.
+/// Exemplars (one, or one an axis) that were checked, freed of their edges and taken apart into common colour components.
 pub(crate) struct Prepared {
     pub(crate) colours: PrincipalColours,
     /// Distribution of each channel.
     pub(crate) channels: Vec<Quantiles>,
-    /// Components (y, x), the pixels outside the mask filled smoothly.
+    pub(crate) views: Vec<View>,
+}
+
+/// One exemplar's colour components.
+pub(crate) struct View {
+    /// Components (y, x), the pixels outside the mask filled smoothly; of twice the sides if mirrored.
     pub(crate) components: Vec<Array2<f32>>,
-    mask: Option<Array2<bool>>,
+    pub(crate) mask: Option<Array2<bool>>,
+    edges: Edges,
 }
 
 impl Prepared {
-    pub(crate) fn new(exemplar: &Exemplar<'_>) -> Result<Self, TextureError> {
-        let (height, width, channels) = exemplar.image.dim();
-        if height < 8 || width < 8 {
-            return Err(TextureError::ExemplarTooSmall { height, width });
-        }
-        if channels == 0 {
-            return Err(TextureError::NoChannels);
-        }
-        if let Some(mask) = exemplar.mask
-            && mask.dim() != (height, width)
-        {
-            return Err(TextureError::MaskShape {
-                mask: [mask.nrows(), mask.ncols()],
-                image: [height, width],
-            });
-        }
-        let mask = exemplar
-            .mask
-            .filter(|mask| !mask.iter().all(|&m| m))
-            .map(|mask| mask.to_owned());
-        let counts = |at: (usize, usize)| mask.as_ref().is_none_or(|mask| mask[at]);
-        let selected = mask
-            .as_ref()
-            .map_or(height * width, |mask| mask.iter().filter(|m| **m).count());
-        if selected < FEWEST_PIXELS {
-            return Err(TextureError::MaskTooSmall {
-                selected,
-                needed: FEWEST_PIXELS,
-            });
-        }
-        if let Some(((row, column, _), _)) = exemplar
-            .image
-            .indexed_iter()
-            .find(|((y, x, _), v)| !v.is_finite() && counts((*y, *x)))
-        {
-            return Err(TextureError::NotFinite { row, column });
-        }
-        let views: Vec<ArrayView2<'_, f32>> = exemplar.image.axis_iter(Axis(2)).collect();
-        let planes: Vec<Array2<f32>> = views
-            .into_par_iter()
-            .map(|plane| periodic_plane(plane, mask.as_ref()))
-            .collect();
-        let inside: Vec<f32> = (0..height)
-            .flat_map(|y| (0..width).map(move |x| (y, x)))
-            .filter(|&at| counts(at))
-            .flat_map(|at| planes.iter().map(move |plane| plane[at]))
-            .collect();
-        let colours = PrincipalColours::fit(channels, inside.chunks_exact(channels));
-        let channels = (0..channels)
-            .map(|c| quantiles(inside.iter().skip(c).step_by(channels).copied(), selected))
-            .collect();
-        let mut components = vec![Array2::zeros((height, width)); planes.len()];
-        let (mut colour, mut component) = (vec![0.0; planes.len()], vec![0.0; planes.len()]);
-        for y in 0..height {
-            for x in 0..width {
-                colour.iter_mut().zip(&planes).for_each(|(v, plane)| *v = plane[[y, x]]);
-                colours.decorrelate(&colour, &mut component);
-                components
-                    .iter_mut()
-                    .zip(&component)
-                    .for_each(|(plane, &v)| plane[[y, x]] = v);
+    pub(crate) fn new(exemplars: &[Exemplar<'_>], edges: Edges) -> Result<Self, TextureError> {
+        let channels = exemplars.first().map_or(0, |exemplar| exemplar.image.dim().2);
+        let mut inside: Vec<Vec<f32>> = Vec::new();
+        let (mut planes_of, mut masks) = (Vec::new(), Vec::new());
+        for exemplar in exemplars {
+            let found = exemplar.image.dim().2;
+            if found != channels {
+                return Err(TextureError::ChannelsDiffer {
+                    expected: channels,
+                    found,
+                });
             }
+            let (height, width, _) = exemplar.image.dim();
+            let mask = checked_mask(exemplar)?;
+            let counts = |at: (usize, usize)| mask.as_ref().is_none_or(|mask| mask[at]);
+            let slices: Vec<ArrayView2<'_, f32>> = exemplar.image.axis_iter(Axis(2)).collect();
+            let planes: Vec<Array2<f32>> = slices
+                .into_par_iter()
+                .map(|plane| plane_without_edges(plane, mask.as_ref(), edges))
+                .collect();
+            inside.push(
+                (0..height)
+                    .flat_map(|y| (0..width).map(move |x| (y, x)))
+                    .filter(|&at| counts(at))
+                    .flat_map(|at| planes.iter().map(move |plane| plane[at]))
+                    .collect(),
+            );
+            let mask = mask.map(|mask| {
+                if edges == Edges::Mirror {
+                    mirrored(mask.view())
+                } else {
+                    mask
+                }
+            });
+            planes_of.push(planes);
+            masks.push(mask);
         }
+        // Every exemplar has the same say, whatever its size.
+        let least = inside.iter().map(|values| values.len() / channels).min().unwrap_or(0);
+        let pooled: Vec<f32> = inside
+            .iter()
+            .flat_map(|values| {
+                let n = values.len() / channels;
+                (0..least).flat_map(move |i| {
+                    let at = i * n / least * channels;
+                    values[at..at + channels].iter().copied()
+                })
+            })
+            .collect();
+        let colours = PrincipalColours::fit(channels, pooled.chunks_exact(channels));
+        let views = planes_of
+            .iter()
+            .zip(masks)
+            .map(|(planes, mask)| View {
+                components: components(planes, &colours),
+                mask,
+                edges,
+            })
+            .collect();
+        let channels = (0..channels)
+            .map(|c| {
+                quantiles(
+                    pooled.iter().skip(c).step_by(channels).copied(),
+                    pooled.len() / channels,
+                )
+            })
+            .collect();
         Ok(Self {
             colours,
             channels,
-            components,
-            mask,
+            views,
         })
     }
 
-    pub(crate) fn shape(&self) -> [usize; 2] {
-        [self.components[0].nrows(), self.components[0].ncols()]
+    /// Number of colour components.
+    pub(crate) fn count(&self) -> usize {
+        self.channels.len()
     }
 
     /// Whether a component varies enough to have a texture.
@@ -138,8 +146,41 @@ impl Prepared {
         variances[component] > 1e-12 && variances[component] > 1e-9 * variances[0]
     }
 
-    /// Spectrum that the slices of a volume should have in one component.
+    /// Spectrum that the slices of a volume should have in one component: the mean over the exemplars.
     pub(crate) fn slice_spectrum(&self, component: usize) -> RadialSpectrum {
+        let mut spectra = self.views.iter().map(|view| view.spectrum(component));
+        let mut mean = spectra.next().expect("at least one exemplar");
+        for other in spectra {
+            mean.power.iter_mut().zip(&other.power).for_each(|(m, p)| *m += p);
+        }
+        let n = self.views.len() as f64;
+        mean.power.iter_mut().for_each(|p| *p /= n);
+        mean
+    }
+}
+
+impl View {
+    pub(crate) fn shape(&self) -> [usize; 2] {
+        [self.components[0].nrows(), self.components[0].ncols()]
+    }
+
+    pub(crate) fn transposed(&self) -> Self {
+        let turned = |image: &Array2<f32>| image.t().as_standard_layout().into_owned();
+        Self {
+            components: self.components.iter().map(turned).collect(),
+            mask: self
+                .mask
+                .as_ref()
+                .map(|mask| mask.t().as_standard_layout().into_owned()),
+            edges: self.edges,
+        }
+    }
+
+    pub(crate) fn mirrored(&self) -> bool {
+        self.edges == Edges::Mirror
+    }
+
+    fn spectrum(&self, component: usize) -> RadialSpectrum {
         let image = &self.components[component];
         match &self.mask {
             None => radial_spectrum(image.view(), RADIAL_BINS).expect("a checked image"),
@@ -148,11 +189,79 @@ impl Prepared {
     }
 }
 
-/// One channel, filled outside the mask, without jumps at its edges, with the mean of its pixels that count kept.
-fn periodic_plane(plane: ArrayView2<'_, f32>, mask: Option<&Array2<bool>>) -> Array2<f32> {
+/// Checks sizes, channels, mask and values; the mask, if it leaves anything out.
+fn checked_mask(exemplar: &Exemplar<'_>) -> Result<Option<Array2<bool>>, TextureError> {
+    let (height, width, channels) = exemplar.image.dim();
+    if height < 8 || width < 8 {
+        return Err(TextureError::ExemplarTooSmall { height, width });
+    }
+    if channels == 0 {
+        return Err(TextureError::NoChannels);
+    }
+    if let Some(mask) = exemplar.mask
+        && mask.dim() != (height, width)
+    {
+        return Err(TextureError::MaskShape {
+            mask: [mask.nrows(), mask.ncols()],
+            image: [height, width],
+        });
+    }
+    let mask = exemplar
+        .mask
+        .filter(|mask| !mask.iter().all(|&m| m))
+        .map(|mask| mask.to_owned());
+    let selected = mask
+        .as_ref()
+        .map_or(height * width, |mask| mask.iter().filter(|m| **m).count());
+    if selected < FEWEST_PIXELS {
+        return Err(TextureError::MaskTooSmall {
+            selected,
+            needed: FEWEST_PIXELS,
+        });
+    }
+    let counts = |at: (usize, usize)| mask.as_ref().is_none_or(|mask| mask[at]);
+    let bad = |((y, x, _), v): &((usize, usize, usize), &f32)| !v.is_finite() && counts((*y, *x));
+    if let Some(((row, column, _), _)) = exemplar.image.indexed_iter().find(bad) {
+        return Err(TextureError::NotFinite { row, column });
+    }
+    Ok(mask)
+}
+
+fn components(planes: &[Array2<f32>], colours: &PrincipalColours) -> Vec<Array2<f32>> {
+    let mut components = vec![Array2::zeros(planes[0].dim()); planes.len()];
+    let (mut colour, mut component) = (vec![0.0; planes.len()], vec![0.0; planes.len()]);
+    for y in 0..planes[0].nrows() {
+        for x in 0..planes[0].ncols() {
+            colour.iter_mut().zip(planes).for_each(|(v, plane)| *v = plane[[y, x]]);
+            colours.decorrelate(&colour, &mut component);
+            components
+                .iter_mut()
+                .zip(&component)
+                .for_each(|(plane, &v)| plane[[y, x]] = v);
+        }
+    }
+    components
+}
+
+/// An image with its mirror images beside and below it: twice the sides, no jump where it repeats.
+fn mirrored<T: Copy>(image: ArrayView2<'_, T>) -> Array2<T> {
+    let (height, width) = image.dim();
+    let back = |i: usize, n: usize| if i < n { i } else { 2 * n - 1 - i };
+    Array2::from_shape_fn((2 * height, 2 * width), |(y, x)| {
+        image[[back(y, height), back(x, width)]]
+    })
+}
+
+/// One channel, filled outside the mask, its edges taken care of, with the mean of its pixels that count kept.
+fn plane_without_edges(plane: ArrayView2<'_, f32>, mask: Option<&Array2<bool>>, edges: Edges) -> Array2<f32> {
     let mut plane = plane.to_owned();
     if let Some(mask) = mask {
         fill_outside(&mut plane, mask.view());
+    }
+    match edges {
+        Edges::Wrap => return plane,
+        Edges::Mirror => return mirrored(plane.view()),
+        Edges::PeriodicComponent => {}
     }
     let mean = |values: &Array2<f32>| {
         let inside = values
@@ -169,7 +278,7 @@ fn periodic_plane(plane: ArrayView2<'_, f32>, mask: Option<&Array2<bool>>) -> Ar
     periodic
 }
 
-fn quantiles(values: impl Iterator<Item = f32>, count: usize) -> Quantiles {
+pub(crate) fn quantiles(values: impl Iterator<Item = f32>, count: usize) -> Quantiles {
     let step = count.div_ceil(SAMPLES).max(1);
     let kept: Vec<f32> = values.step_by(step).collect();
     Quantiles::new(kept)
@@ -212,153 +321,4 @@ fn masked_spectrum(image: &Array2<f64>, mask: ArrayView2<'_, bool>) -> RadialSpe
         power,
         count,
     }
-}
-
-/// Target distributions of the bands of one component.
-pub(crate) struct BandTargets {
-    pub(crate) targets: Vec<Quantiles>,
-    /// Target of each band.
-    pub(crate) of_band: Vec<usize>,
-}
-
-/// Whether the orientations of a level share one target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pooling {
-    Apart,
-    Together,
-}
-
-/// Bands of the components, each coefficient with the share of its filter's energy that falls on the mask.
-pub(crate) struct Analysis {
-    bank: FilterBank<f32>,
-    /// For each level (high-pass, levels, low-pass): whether a sample counts.
-    counted: Vec<Option<Vec<bool>>>,
-    pub(crate) findings: Vec<Finding>,
-}
-
-impl Analysis {
-    pub(crate) fn new(exemplar: &Prepared, levels: usize, orientations: usize) -> Self {
-        let bank = FilterBank::new(&exemplar.shape(), levels, orientations);
-        let mut findings = Vec::new();
-        let counted = (0..levels + 2)
-            .map(|i| {
-                let mask = exemplar.mask.as_ref()?;
-                let shape = bank.shape_at(i.saturating_sub(1));
-                let shares = filter_shares(mask, i, levels, shape);
-                let (counted, least) = enough(&shares);
-                if least < 0.5 {
-                    let name = match i {
-                        0 => "the high-pass".to_owned(),
-                        i if i == levels + 1 => "the low-pass".to_owned(),
-                        i => format!("level {}", i - 1),
-                    };
-                    let message = format!(
-                        "the mask's regions are small for {name} of the pyramid: samples were used of which only \
-                         {:.0} % lie in the mask",
-                        100.0 * least
-                    );
-                    findings.push(Finding {
-                        code: "few-samples",
-                        message,
-                    });
-                }
-                Some(counted)
-            })
-            .collect();
-        Self {
-            bank,
-            counted,
-            findings,
-        }
-    }
-
-    pub(crate) fn targets(&self, component: &Array2<f32>, pooling: Pooling) -> BandTargets {
-        let mut coefficients = vec![0.0; self.bank.coefficients()];
-        let field = component.as_slice().expect("components are in C order");
-        self.bank.analyse(field, &mut coefficients, &mut self.bank.work());
-        let (levels, count) = (self.bank.level_count(), self.bank.orientations());
-        let ranges = self.bank.ranges();
-        // The bands that share a target, and the level whose mask they share.
-        let groups: Vec<(usize, Vec<usize>)> = [(0, vec![0])]
-            .into_iter()
-            .chain((0..levels).flat_map(|l| {
-                let bands = 1 + l * count..1 + (l + 1) * count;
-                match pooling {
-                    Pooling::Together => vec![(l + 1, bands.collect())],
-                    Pooling::Apart => bands.map(|b| (l + 1, vec![b])).collect(),
-                }
-            }))
-            .chain([(levels + 1, vec![ranges.len() - 1])])
-            .collect();
-        let mut of_band = vec![0; ranges.len()];
-        groups
-            .iter()
-            .enumerate()
-            .for_each(|(g, (_, bands))| bands.iter().for_each(|&b| of_band[b] = g));
-        let targets = groups
-            .par_iter()
-            .map(|(level, bands)| {
-                let counted = self.counted[*level].as_ref();
-                let values = bands
-                    .iter()
-                    .flat_map(|&b| coefficients[ranges[b].clone()].iter().enumerate());
-                let kept = values
-                    .filter(|(i, _)| counted.is_none_or(|counted| counted[*i]))
-                    .map(|(_, &v)| v);
-                let samples: usize = bands.len()
-                    * counted.map_or(ranges[bands[0]].len(), |counted| counted.iter().filter(|c| **c).count());
-                quantiles(kept, samples)
-            })
-            .collect();
-        BandTargets { targets, of_band }
-    }
-}
-
-/// For each sample of a level, the share of its filter's energy that falls on the mask.
-fn filter_shares(mask: &Array2<bool>, i: usize, levels: usize, shape: &[usize]) -> Vec<f64> {
-    let (height, width) = mask.dim();
-    let fft = RealFft::<f64>::new(&[height, width]).expect("a checked mask");
-    let cut = |level: usize| 0.5_f64.powi(i32::try_from(level).unwrap_or(i32::MAX) + 1);
-    let response = |r: f64| {
-        let below = |levels: usize| low_pass(r, 1.0) * (0..levels).map(|l| low_pass(r, cut(l))).product::<f64>();
-        if i == 0 {
-            high_pass(r, 1.0)
-        } else if i > levels {
-            below(levels)
-        } else {
-            below(i - 1) * high_pass(r, cut(i - 1))
-        }
-    };
-    let kernel = Array2::from_shape_fn((height, width / 2 + 1), |(y, x)| {
-        let r = 2.0 * frequency(y, height).hypot(x as f64 / width as f64);
-        Complex::new(response(r), 0.0)
-    });
-    let mut energy = fft.inverse(kernel).expect("the planned shape");
-    energy.mapv_inplace(|v| v * v);
-    let total = energy.sum();
-    let on_mask = mask.mapv(|m| if m { 1.0 } else { 0.0 });
-    let spectrum = fft.forward(on_mask.view()).expect("the planned shape")
-        * fft.forward(energy.view()).expect("the planned shape");
-    let share = fft.inverse(spectrum).expect("the planned shape");
-    let nearest = |i: usize, level: usize, full: usize| (2 * i * full + level) / (2 * level) % full;
-    (0..shape[0])
-        .flat_map(|y| (0..shape[1]).map(move |x| (y, x)))
-        .map(|(y, x)| share[[nearest(y, shape[0], height), nearest(x, shape[1], width)]] / total)
-        .collect()
-}
-
-/// The samples that lie well inside the mask, by the strictest of a few limits that leaves enough of them, and that limit.
-fn enough(shares: &[f64]) -> (Vec<bool>, f64) {
-    let inside = shares.iter().filter(|&&s| s >= 0.5).count();
-    let needed = (inside / 4).max(FEWEST_PIXELS.min(shares.len() / 8)).max(1);
-    let limit = [0.98, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1]
-        .into_iter()
-        .find(|&limit| shares.iter().filter(|&&s| s >= limit).count() >= needed)
-        .unwrap_or(0.0);
-    let limit = if limit > 0.0 {
-        limit
-    } else {
-        shares.iter().copied().fold(0.0, f64::max)
-    };
-    (shares.iter().map(|&s| s >= limit).collect(), limit)
 }

@@ -7,6 +7,9 @@ pub enum Mode {
     /// are matched, orientations pooled. The default.
     #[default]
     Slices,
+    /// Slices look like the exemplar in each direction of theirs too, and each axis may have an exemplar of its own:
+    /// [`synthesize_oriented_volume`](crate::synthesize_oriented_volume).
+    Oriented,
     /// A start whose slices have the exemplar's spectrum, then 3D bands of matched shape and corrected variance. Twice
     /// the band error of [`Mode::Slices`] or more, several times as fast.
     Spectrum,
@@ -23,6 +26,20 @@ pub enum Matching {
     Table,
     /// Ranks: [`match_histogram`](crate::match_histogram).
     Exact,
+}
+
+/// How an exemplar's edges are kept out of its statistics. An exemplar that is simply repeated jumps at its edges, and the
+/// jumps fill the axes of every band.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Edges {
+    /// The periodic component of the exemplar (Moisan 2011). Band variances come out 0 to 5 % low for 128 x 128 pixels.
+    #[default]
+    PeriodicComponent,
+    /// The exemplar with its mirror images about it; the statistics are those of the exemplar's own quarter. Band variances
+    /// come out 0 to 3 % low for 128 x 128 pixels, at four times the cost of the exemplar's statistics.
+    Mirror,
+    /// Nothing: right for exemplars that repeat without a seam.
+    Wrap,
 }
 
 /// Options of [`synthesize_image`](crate::synthesize_image) and [`synthesize_volume`](crate::synthesize_volume).
@@ -49,6 +66,8 @@ pub struct TextureOptions {
     pub orientations: usize,
     /// How histograms are matched.
     pub matching: Matching,
+    /// How the exemplar's edges are kept out of its statistics.
+    pub edges: Edges,
     /// Same seed, same bits.
     pub seed: u64,
     /// Bytes of memory that a synthesis may ask for, 4 GiB by default; beyond, it is refused before it starts.
@@ -63,6 +82,7 @@ impl Default for TextureOptions {
             levels: None,
             orientations: 4,
             matching: Matching::default(),
+            edges: Edges::default(),
             seed: 0,
             memory_limit: 4 << 30,
         }
@@ -105,6 +125,13 @@ impl TextureOptions {
         self
     }
 
+    /// With another care of [`Self::edges`].
+    #[must_use]
+    pub fn with_edges(mut self, edges: Edges) -> Self {
+        self.edges = edges;
+        self
+    }
+
     /// With another [`Self::seed`].
     #[must_use]
     pub fn with_seed(mut self, seed: u64) -> Self {
@@ -135,6 +162,20 @@ pub enum TextureError {
     /// The exemplar has no channels.
     #[error("the exemplar has no colour channels")]
     NoChannels,
+    /// No exemplar, or more than one an axis.
+    #[error("a volume is made from one to three exemplars, not {found}")]
+    Exemplars {
+        /// Exemplars given.
+        found: usize,
+    },
+    /// Exemplars of one volume differ in their number of channels.
+    #[error("all exemplars of a volume need as many colour channels: {expected} and {found} were given")]
+    ChannelsDiffer {
+        /// Channels of the first exemplar.
+        expected: usize,
+        /// Channels of another.
+        found: usize,
+    },
     /// A pixel that counts is NaN or infinite.
     #[error("the exemplar's pixel at row {row}, column {column} is NaN or infinite: mend it or mask it out")]
     NotFinite {
@@ -209,6 +250,9 @@ pub struct TextureReport {
     /// Before each round of matching, how far the bands still were from their targets: root mean square over bands and
     /// colour components of ln(variance / target variance).
     pub band_errors: Vec<f64>,
+    /// After each round, how far the bands of the slices along all three axes are from the exemplar's: the same measure, in
+    /// every mode (orientations of a level together). When it falls no further, more rounds are of no use. Empty for images.
+    pub slice_errors: Vec<f64>,
     /// What the user should know.
     pub findings: Vec<Finding>,
 }

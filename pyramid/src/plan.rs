@@ -21,14 +21,17 @@ pub(crate) struct Plan {
 impl Plan {
     /// Checks what needs no look at the pixels. `shape` is the result's.
     pub(crate) fn new(
-        exemplar: &Exemplar<'_>,
+        exemplars: &[Exemplar<'_>],
         shape: &[usize],
         options: &TextureOptions,
     ) -> Result<Self, TextureError> {
-        let (height, width, channels) = exemplar.image.dim();
-        if height < 8 || width < 8 {
-            return Err(TextureError::ExemplarTooSmall { height, width });
+        for exemplar in exemplars {
+            let (height, width, _) = exemplar.image.dim();
+            if height < 8 || width < 8 {
+                return Err(TextureError::ExemplarTooSmall { height, width });
+            }
         }
+        let channels = exemplars[0].image.dim().2;
         if shape.iter().any(|&n| n < 8) {
             return Err(TextureError::ResultTooSmall { shape: shape.to_vec() });
         }
@@ -47,10 +50,11 @@ impl Plan {
                 limit: options.memory_limit,
             });
         }
-        let shortest = shape.iter().copied().fold(height.min(width), usize::min);
-        let most = most_levels(&[shortest]);
+        let sides = exemplars.iter().flat_map(|exemplar| exemplar.image.shape()[..2].iter());
+        let shortest = sides.chain(shape).copied().min().unwrap_or(0);
+        let most = most_levels(&[shortest], &[]);
         let usual = (1..=most)
-            .take_while(|&l| l == 1 || level_shape(&[shortest], l - 1)[0] >= COARSEST)
+            .take_while(|&l| l == 1 || level_shape(&[shortest], &[], l - 1)[0] >= COARSEST)
             .count();
         Ok(Self {
             levels: options.levels.map_or(usual, |asked| asked.min(most)),
@@ -77,6 +81,7 @@ impl Plan {
         TextureReport {
             levels: self.levels,
             band_errors: Vec::new(),
+            slice_errors: Vec::new(),
             findings,
         }
     }

@@ -7,8 +7,10 @@ use rayon::prelude::*;
 
 use crate::bank::FilterBank;
 use crate::canvas::{Canvas, match_bands};
-use crate::exemplar::{Analysis, Exemplar, Pooling, Prepared};
+use crate::exemplar::{Exemplar, Prepared};
+use crate::filters::Directions;
 use crate::plan::{Plan, root_mean_square, shaped, white_noise};
+use crate::targets::{Analysis, Pooling};
 use crate::{TextureError, TextureOptions, TextureReport};
 
 /// An image of any size that looks like the exemplar, and repeats without a seam.
@@ -79,19 +81,19 @@ pub fn synthesize_image_with_report(
     options: &TextureOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<(Array3<f32>, TextureReport), TextureError> {
-    let plan = Plan::new(exemplar, &size, options)?;
-    let exemplar = Prepared::new(exemplar)?;
+    let plan = Plan::new(&[*exemplar], &size, options)?;
+    let exemplar = Prepared::new(&[*exemplar], options.edges)?;
     let mut report = plan.report(&exemplar);
-    let analysis = Analysis::new(&exemplar, plan.levels, options.orientations);
+    let analysis = Analysis::new(&exemplar.views[0], plan.levels, options.orientations);
     report.findings.extend(analysis.findings.iter().cloned());
-    let bank = FilterBank::new(&size, plan.levels, options.orientations);
+    let bank = FilterBank::new(&size, &[], plan.levels, &Directions::plane(options.orientations));
     let samples = size[0] * size[1];
-    let count = exemplar.components.len();
+    let count = exemplar.count();
     let targets: Vec<_> = (0..count)
         .map(|c| {
             exemplar
                 .varies(c)
-                .then(|| analysis.targets(&exemplar.components[c], Pooling::Apart))
+                .then(|| analysis.targets(&exemplar.views[0].components[c], Pooling::Apart))
         })
         .collect();
     let start = (0..count)
@@ -110,7 +112,7 @@ pub fn synthesize_image_with_report(
             .components
             .par_iter_mut()
             .zip(&targets)
-            .filter_map(|(field, targets)| Some(match_bands(field, &bank, targets.as_ref()?, options.matching)))
+            .filter_map(|(field, targets)| Some(match_bands(field, &bank, targets.as_ref()?, options.matching, 0.0)))
             .collect();
         report.band_errors.push(root_mean_square(&errors));
         if progress((round + 1) as f64 / options.iterations as f64).is_break() {

@@ -3,8 +3,10 @@
 mod acceptance;
 mod figures;
 mod label_scores;
+mod particle_noise;
 mod sample;
 mod sand;
+mod texture_table;
 mod tidy;
 
 use std::path::{Path, PathBuf};
@@ -25,14 +27,18 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
-    /// Runs the released program on photographs outside the project and writes docs/acceptance.md
+    /// Runs the released program on photographs outside the project and writes docs/acceptance.md, and synthesises textures
+    /// outside the project and writes the table of docs/texture.md
     Acceptance {
-        /// Folder that holds images/
+        /// Folder that holds images/ and textures/
         #[arg(long)]
         data: PathBuf,
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
+        /// Only this part: photographs, textures or noise
+        #[arg(long)]
+        only: Option<String>,
     },
     /// Draws the paper's figures into docs/figures
     Figures {
@@ -48,12 +54,21 @@ enum Task {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
-        Task::Acceptance { data, results } => acceptance::run(
-            &root()?.join("target/release/stereology"),
-            &data,
-            &results,
-            &root()?.join("docs/acceptance.md"),
-        ),
+        Task::Acceptance { data, results, only } => {
+            let wanted = |part: &str| only.as_deref().is_none_or(|only| only == part);
+            if wanted("photographs") {
+                let program = root()?.join("target/release/stereology");
+                acceptance::run(&program, &data, &results, &root()?.join("docs/acceptance.md"))?;
+            }
+            let page = root()?.join("docs/texture.md");
+            if wanted("textures") {
+                texture_table::run(&data.join("textures"), &results.join("textures"), &page)?;
+            }
+            if wanted("noise") {
+                particle_noise::run(&data.join("images"), &page)?;
+            }
+            Ok(())
+        }
         Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),

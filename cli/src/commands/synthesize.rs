@@ -182,7 +182,7 @@ impl Synthesize {
             pack: PackOptions::default()
                 .with_mode(self.solid.pack_mode.way())
                 .with_seed(seed),
-            texture: self.texture.options(self.texture_mode, seed)?,
+            texture: self.texture.options(self.texture_mode, seed),
             texture_voxels: self.solid.texture_voxels,
             seed,
         })

@@ -9,7 +9,8 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use ndarray::{Array3, Axis};
 use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
 use stereology::pyramid::{
-    self, Exemplar, TextureOptions, synthesize_image_with_report, synthesize_volume_with_report,
+    self, Exemplar, TextureOptions, synthesize_image_with_report, synthesize_oriented_volume,
+    synthesize_volume_with_report,
 };
 use stereology::segment::read_photo;
 
@@ -26,11 +27,15 @@ use crate::warnings::Warning;
 /// Heeger-Bergen synthesis with a steerable pyramid. --size N or NZ,NY,NX makes a volume every slice of which looks like IMAGE; H,W makes a picture. Good for
 /// textures without large forms (stone, sand, paste); particles are the business of `stereology synthesize`.
 ///
+/// Two or three pictures make a volume that looks different along its axes (--mode oriented): the first shows the slices normal to z (rows along y,
+/// columns along x), the second those normal to y (rows along z, columns along x), the third those normal to x (rows along z, columns along y); of two, the
+/// second stands for y and x. They must be at the same scale.
+///
 /// Writes u8 colours: .png (picture), .npy, .nrrd, .vti or .tif (volume).
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology texture granite.png --size 128 -o granite.npy")]
 pub struct Texture {
-    /// Picture of the texture (three pictures, one an axis: not available yet)
+    /// Picture of the texture; or two or three, one an axis: normal to z, y, x
     #[arg(value_name = "IMAGE", required = true, num_args = 1..=3)]
     pub images: Vec<PathBuf>,
     /// Samples: N or NZ,NY,NX (volume), H,W (picture)
@@ -38,9 +43,9 @@ pub struct Texture {
     pub size: Extent,
     #[command(flatten)]
     pub choices: Choices,
-    /// How a volume is made
-    #[arg(long, value_enum, default_value_t = Mode::Slices)]
-    pub mode: Mode,
+    /// How a volume is made [default: slices; oriented for two or three pictures]
+    #[arg(long, value_enum)]
+    pub mode: Option<Mode>,
     /// File for the result; its ending tells the format
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -60,6 +65,32 @@ pub struct Choices {
     /// Orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
+    /// How values are given another distribution
+    #[arg(long, value_enum, default_value_t = Matching::Table)]
+    pub matching: Matching,
+    /// How the picture's edges are kept out of its statistics
+    #[arg(long, value_enum, default_value_t = Edges::PeriodicComponent)]
+    pub edges: Edges,
+}
+
+/// How values are given another distribution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Matching {
+    /// By a table of 4096 bins: fast
+    Table,
+    /// By rank: exact
+    Exact,
+}
+
+/// How the picture's edges are kept out of its statistics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Edges {
+    /// The picture's periodic component
+    PeriodicComponent,
+    /// The picture and its mirror images
+    Mirror,
+    /// Not at all: for pictures that repeat without a seam
+    Wrap,
 }
 
 /// How a volume is made.
@@ -67,7 +98,7 @@ pub struct Choices {
 pub enum Mode {
     /// Every slice of the three axes matches the picture
     Slices,
-    /// One picture an axis (not available yet)
+    /// Every slice matches the picture in each direction of its own too; one picture an axis, if given
     Oriented,
     /// The spectrum a slice should show, and corrected band variances: faster
     Spectrum,
@@ -77,14 +108,12 @@ pub enum Mode {
 
 impl Mode {
     /// How the volume is made.
-    pub fn way(self) -> Result<pyramid::Mode, Failure> {
+    pub fn way(self) -> pyramid::Mode {
         match self {
-            Self::Slices => Ok(pyramid::Mode::Slices),
-            Self::Spectrum => Ok(pyramid::Mode::Spectrum),
-            Self::Volume => Ok(pyramid::Mode::Volume),
-            Self::Oriented => Err(Failure::not_available(
-                "texture from one picture an axis (--mode oriented)",
-            )),
+            Self::Slices => pyramid::Mode::Slices,
+            Self::Oriented => pyramid::Mode::Oriented,
+            Self::Spectrum => pyramid::Mode::Spectrum,
+            Self::Volume => pyramid::Mode::Volume,
         }
     }
 
@@ -101,16 +130,25 @@ impl Mode {
 
 impl Choices {
     /// The options of the synthesis.
-    pub fn options(&self, mode: Mode, seed: u64) -> Result<TextureOptions, Failure> {
+    pub fn options(&self, mode: Mode, seed: u64) -> TextureOptions {
         let options = TextureOptions::default()
-            .with_mode(mode.way()?)
+            .with_mode(mode.way())
             .with_iterations(self.iterations)
             .with_orientations(self.orientations)
+            .with_matching(match self.matching {
+                Matching::Table => pyramid::Matching::Table,
+                Matching::Exact => pyramid::Matching::Exact,
+            })
+            .with_edges(match self.edges {
+                Edges::PeriodicComponent => pyramid::Edges::PeriodicComponent,
+                Edges::Mirror => pyramid::Edges::Mirror,
+                Edges::Wrap => pyramid::Edges::Wrap,
+            })
             .with_seed(seed);
-        Ok(match self.levels {
+        match self.levels {
             Some(levels) => options.with_levels(levels),
             None => options,
-        })
+        }
     }
 }
 
@@ -122,28 +160,47 @@ enum Target {
 
 impl Texture {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let options = self.choices.options(self.mode, everywhere.seed)?;
-        let [path] = &self.images[..] else {
-            return Err(Failure::not_available(
-                "texture from one picture an axis (--mode oriented)",
-            ));
-        };
+        let several = self.images.len() > 1;
+        let mode = self.mode.unwrap_or(if several { Mode::Oriented } else { Mode::Slices });
+        if several && mode != Mode::Oriented {
+            return Err(Failure::usage(format!(
+                "--mode {} takes one picture: several are for --mode oriented",
+                mode.name()
+            )));
+        }
+        let options = self.choices.options(mode, everywhere.seed);
         let target = self.target()?;
+        if several && matches!(target, Target::Picture(_)) {
+            return Err(Failure::usage(
+                "a picture is made from one picture, a volume from up to three",
+            ));
+        }
         check_file(&self.output, everywhere.force)?;
-        let picture = read_photo(path).at(path)?;
-        let exemplar = samples(&picture);
-        let exemplar = Exemplar::new(exemplar.view());
+        let path = &self.images[0];
+        let pictures = self
+            .images
+            .iter()
+            .map(|path| read_photo(path).at(path))
+            .collect::<Result<Vec<_>, _>>()?;
+        let channels = if pictures.iter().all(is_grey) { 1 } else { 3 };
+        let samples: Vec<Array3<f32>> = pictures.iter().map(|picture| samples(picture, channels)).collect();
+        let exemplars: Vec<Exemplar<'_>> = samples.iter().map(|samples| Exemplar::new(samples.view())).collect();
         let step = Step::begin("texture", everywhere.quiet);
         let progress = |done: f64| step.at(done);
         let (shape, report) = match target {
             Target::Picture(size) => {
-                let (made, report) = synthesize_image_with_report(&exemplar, size, &options, &progress).at(path)?;
+                let (made, report) = synthesize_image_with_report(&exemplars[0], size, &options, &progress).at(path)?;
                 go_on()?;
                 write_picture(&self.output, &made)?;
                 (made.shape().to_vec(), report)
             }
             Target::Volume(size, format) => {
-                let (made, report) = synthesize_volume_with_report(&exemplar, size, &options, &progress).at(path)?;
+                let (made, report) = if several {
+                    synthesize_oriented_volume(&exemplars, size, &options, &progress)
+                } else {
+                    synthesize_volume_with_report(&exemplars[0], size, &options, &progress)
+                }
+                .at(path)?;
                 go_on()?;
                 let (nz, ny, nx, channels) = made.dim();
                 write_volume::<u8>(
@@ -173,16 +230,26 @@ impl Texture {
             ))
             .line(format!(
                 "mode {}, {} rounds, {} levels",
-                self.mode.name(),
+                mode.name(),
                 self.choices.iterations,
                 report.levels
             ))
+            .line(format!(
+                "bands off by, round by round: {}",
+                report
+                    .band_errors
+                    .iter()
+                    .map(|error| format!("{error:.3}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
+            ))
             .field("shape", shape)
-            .field("mode", self.mode.name())
+            .field("mode", mode.name())
             .field("iterations", self.choices.iterations)
             .field("levels", report.levels)
             .field("orientations", self.choices.orientations)
-            .field("band_errors", report.band_errors);
+            .field("band_errors", report.band_errors)
+            .field("slice_errors", report.slice_errors);
         for finding in &report.findings {
             answer.warn(Warning::new(finding.code, finding.message.clone()));
         }
@@ -214,12 +281,14 @@ impl Texture {
     }
 }
 
-/// Values 0 to 1 of a picture (y, x, channel): one channel if it is grey all over.
-fn samples(picture: &RgbImage) -> Array3<f32> {
-    let grey = picture
+fn is_grey(picture: &RgbImage) -> bool {
+    picture
         .pixels()
-        .all(|pixel| pixel.0[0] == pixel.0[1] && pixel.0[1] == pixel.0[2]);
-    let channels = if grey { 1 } else { 3 };
+        .all(|pixel| pixel.0[0] == pixel.0[1] && pixel.0[1] == pixel.0[2])
+}
+
+/// Values 0 to 1 of a picture (y, x, channel).
+fn samples(picture: &RgbImage, channels: usize) -> Array3<f32> {
     Array3::from_shape_fn(
         (picture.height() as usize, picture.width() as usize, channels),
         |(y, x, channel)| f32::from(picture.get_pixel(x as u32, y as u32).0[channel]) / 255.0,

@@ -51,7 +51,6 @@ fn what_is_not_built_says_so() {
         &["contact", "a.png", "--json"],
         &["displace"],
         &["explore"],
-        &["texture", "a.png", "--mode", "oriented", "--size", "8", "-o", "a.npy"],
     ] {
         let (code, _, error) = stereology(later);
         assert_eq!(code, 2, "{later:?}: {error}");

@@ -352,6 +352,21 @@ fn textures_and_their_bands() {
         &picture,
     ]);
     assert_eq!(image::open(&picture).unwrap().into_rgb8().dimensions(), (24, 40));
+    let oriented = path(&folder, "o.npy");
+    let made = answer(&[
+        "texture",
+        &photo,
+        &photo,
+        &photo,
+        "--size",
+        "16",
+        "--iterations",
+        "1",
+        "-o",
+        &oriented,
+    ]);
+    assert_eq!(made["mode"], "oriented");
+    assert_eq!(made["slice_errors"].as_array().unwrap().len(), 1);
 }
 
 /// What `shape` writes is a SHAPE of the same measures.

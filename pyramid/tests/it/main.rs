@@ -7,5 +7,6 @@
 
 mod matching;
 mod pyramid;
+mod space;
 mod spheres;
 mod synthesis;

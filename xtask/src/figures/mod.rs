@@ -9,6 +9,7 @@ mod particles;
 mod section_likelihood;
 mod solids;
 mod sphere_samples;
+pub mod textures;
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 13] = [
+    let figures: [(&str, Figure); 14] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -31,6 +32,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("coverage", estimators::draw_coverage),
         ("figure-09-particles", particles::draw_shapes),
         ("packing", packings::draw),
+        ("texture", textures::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

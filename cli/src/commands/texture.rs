@@ -68,9 +68,9 @@ pub struct Choices {
     /// How values are given another distribution
     #[arg(long, value_enum, default_value_t = Matching::Table)]
     pub matching: Matching,
-    /// How the picture's edges are kept out of its statistics
+    /// How the picture's borders are kept out of its statistics
     #[arg(long, value_enum, default_value_t = Edges::PeriodicComponent)]
-    pub edges: Edges,
+    pub borders: Edges,
 }
 
 /// How values are given another distribution.
@@ -82,7 +82,7 @@ pub enum Matching {
     Exact,
 }
 
-/// How the picture's edges are kept out of its statistics.
+/// How the picture's borders are kept out of its statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Edges {
     /// The picture's periodic component
@@ -139,7 +139,7 @@ impl Choices {
                 Matching::Table => pyramid::Matching::Table,
                 Matching::Exact => pyramid::Matching::Exact,
             })
-            .with_edges(match self.edges {
+            .with_edges(match self.borders {
                 Edges::PeriodicComponent => pyramid::Edges::PeriodicComponent,
                 Edges::Mirror => pyramid::Edges::Mirror,
                 Edges::Wrap => pyramid::Edges::Wrap,

@@ -18,7 +18,7 @@ pub enum Mode {
     Sequential,
 }
 
-/// What [`pack`] may do.
+/// What [`pack`](crate::pack()) may do.
 ///
 /// # Examples
 ///

@@ -18,7 +18,7 @@ impl State {
         self.area + t * (self.slope + t * self.curvature)
     }
 
-    fn advance(&mut self, t: f64) {
+    pub(crate) fn advance(&mut self, t: f64) {
         self.area = self.at(t);
         self.slope += 2.0 * t * self.curvature;
     }

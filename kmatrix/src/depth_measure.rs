@@ -68,12 +68,26 @@ impl DepthMeasure {
     }
 
     /// Adds a profile of area a + b t + c t² at the offsets 0 ≤ t ≤ `length`.
-    pub(crate) fn add_profile(&mut self, [a, b, c]: [f64; 3], length: f64) {
+    pub(crate) fn add_profile(&mut self, area: [f64; 3], length: f64) {
+        self.add_lengths(area, length);
+        self.moments.area_squared += integral_of_square(area, length);
+    }
+
+    /// Adds a section that is one profile of area a + b t + c t² at the offsets 0 ≤ t ≤ `length`.
+    pub(crate) fn add_section(&mut self, area: [f64; 3], length: f64) {
+        self.add_lengths(area, length);
+        let squares = integral_of_square(area, length);
+        self.moments.area_squared += squares;
+        self.moments.total_squared += squares;
+    }
+
+    fn add_lengths(&mut self, [a, b, c]: [f64; 3], length: f64) {
         self.moments.profiles += length;
         self.moments.area += length * (a + length * (0.5 * b + length * c * (1.0 / 3.0)));
-        self.moments.area_squared += integral_of_square([a, b, c], length);
-        let turn = if c == 0.0 { 0.0 } else { -0.5 * b / c };
-        if turn > 0.0 && turn < length {
+        // The turn lies within where the slope changes its sign.
+        let slope = b + 2.0 * c * length;
+        if b * slope < 0.0 {
+            let turn = -0.5 * b / c;
             let top = a + 0.5 * b * turn;
             self.add_monotone(top, 0.0, c, turn);
             self.add_monotone(top, 0.0, c, length - turn);
@@ -94,21 +108,23 @@ impl DepthMeasure {
         self.moments.largest = self.moments.largest.max(most);
         // The last bound is A_max: everything is below it, should rounding lift a section above, too.
         let last = self.bounds.len() - 1;
-        let mut k = self.first_not_below(least);
-        while k < last && self.bounds[k] < most {
+        let start = self.first_not_below(least);
+        let sign = 1.0_f64.copysign(end - a);
+        // On a falling stretch what is below the bound comes after the root.
+        let (offset, turned) = if end > a { (0.0, 1.0) } else { (length, -1.0) };
+        let stop = start + self.bounds[start..last].iter().take_while(|bound| **bound < most).count();
+        // Without a way out of the loop several roots are taken at once.
+        for (bound, crossing) in self.bounds[start..stop].iter().zip(&mut self.crossing[start..stop]) {
             // The root on the monotone stretch; b and the root have the sign of the direction, so nothing cancels.
-            let rise = self.bounds[k] - a;
-            let root = (b * b + 4.0 * c * rise).max(0.0).sqrt();
-            let slope = b + root.copysign(end - a);
-            let t = if slope == 0.0 {
-                0.0
-            } else {
-                (2.0 * rise / slope).clamp(0.0, length)
-            };
-            self.crossing[k] += if end > a { t } else { length - t };
-            k += 1;
+            let rise = bound - a;
+            let slope = b + sign * (b * b + 4.0 * c * rise).max(0.0).sqrt();
+            // Nothing over nothing, where the stretch begins level at the bound, becomes nothing.
+            let t = (2.0 * rise / slope).max(0.0).min(length);
+            *crossing += offset + turned * t;
         }
-        self.from[k] += length;
+        self.from[stop] += length;
+        // The next stretch begins where this one ends.
+        self.near = if end > a { stop } else { start };
     }
 
     /// The first bound that is not below an area: near the last one found as a rule, for areas are continuous.

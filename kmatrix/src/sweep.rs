@@ -7,7 +7,7 @@
 use crate::contours::{Contours, State};
 use crate::depth_measure::DepthMeasure;
 use nalgebra::Vector3;
-use stereology_shape::{ClosedMesh, SectionAreas};
+use stereology_shape::{ClosedMesh, Knots, SectionAreas};
 
 /// A sweep whose areas do not add up to the volume to this part was spoilt by an edge that is all but level: it is repeated a hair aside.
 const MOST_DEFECT: f64 = 1e-7;
@@ -18,8 +18,6 @@ const ATTEMPTS: i32 = 4;
 /// A closed mesh about its centroid in units of its reach, with the triangles around every vertex.
 pub(crate) struct Surface<'a> {
     vertices: Vec<Vector3<f64>>,
-    /// The area vector of each triangle.
-    areas: Vec<Vector3<f64>>,
     triangles: &'a [[u32; 3]],
     /// Across edge k → k + 1 of each triangle.
     neighbours: &'a [[u32; 3]],
@@ -49,7 +47,6 @@ impl<'a> Surface<'a> {
         let triangles = mesh.triangles();
         let mut surface = Self {
             vertices,
-            areas: Vec::new(),
             triangles,
             neighbours: mesh.neighbours(),
             starts: Vec::new(),
@@ -61,11 +58,6 @@ impl<'a> Surface<'a> {
             reach,
         };
         surface.list_corners();
-        let area = |corners: &[u32; 3]| {
-            let [a, b, c] = corners.map(|v| surface.vertices[v as usize]);
-            0.5 * (b - a).cross(&(c - a))
-        };
-        surface.areas = triangles.iter().map(area).collect();
         surface.pinched = (0..surface.vertices.len()).map(|v| surface.is_pinched(v)).collect();
         surface
     }
@@ -116,10 +108,7 @@ pub(crate) struct Sweep<'a> {
     surface: &'a Surface<'a>,
     totals: SectionAreas,
     axes: [Vector3<f64>; 2],
-    heights: Vec<f64>,
-    order: Vec<(u64, u32)>,
-    /// Jump of the curvature at each vertex.
-    jumps: Vec<f64>,
+    knots: Knots,
     /// What its corners 0, 1, 2 are to each triangle: two bits of a [`Role`] each.
     roles: Vec<u8>,
     contours: Contours,
@@ -137,9 +126,7 @@ impl<'a> Sweep<'a> {
             surface,
             totals: surface.totals.clone(),
             axes: [Vector3::x(), Vector3::y()],
-            heights: vec![0.0; surface.vertices.len()],
-            order: Vec::new(),
-            jumps: vec![0.0; surface.vertices.len()],
+            knots: Knots::default(),
             roles: vec![0; surface.triangles.len()],
             contours: Contours::default(),
         }
@@ -166,27 +153,29 @@ impl<'a> Sweep<'a> {
     }
 
     fn sweep_convex(&mut self, direction: &Vector3<f64>, measure: &mut DepthMeasure) -> f64 {
-        self.totals.sweep(direction, |low, high, area| {
-            measure.add_profile(area, high - low);
-            measure.add_total(area, high - low);
-        })
+        self.totals
+            .sweep(direction, |low, high, area| measure.add_section(area, high - low))
     }
 
     fn sweep_contours(&mut self, direction: &Vector3<f64>, measure: &mut DepthMeasure) -> f64 {
         let before = measure.moments.area;
-        self.totals
-            .sweep(direction, |low, high, area| measure.add_total(area, high - low));
         self.place(direction);
         let mut contours = std::mem::take(&mut self.contours);
         contours.restart(self.surface.triangles.len());
+        let mut total = State::default();
         let mut below = f64::INFINITY;
-        for i in 0..self.order.len() {
-            let vertex = self.order[i].1;
-            let height = self.heights[vertex as usize];
-            if height > below && contours.have_changed() {
-                contours.find_holes(&self.plane_below(vertex), below, 0.5 * (below + height));
+        for i in 0..self.knots.order.len() {
+            let vertex = self.knots.order[i];
+            let height = self.knots.heights[vertex as usize];
+            if height > below {
+                measure.add_total([total.area, total.slope, total.curvature], height - below);
+                total.advance(height - below);
+                if contours.have_changed() {
+                    contours.find_holes(&self.plane_below(vertex), below, 0.5 * (below + height));
+                }
             }
             below = height;
+            total.curvature += self.knots.jumps[vertex as usize];
             self.pass(vertex, &mut contours, measure);
         }
         self.contours = contours;
@@ -196,26 +185,14 @@ impl<'a> Sweep<'a> {
     #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
     fn place(&mut self, direction: &Vector3<f64>) {
         self.axes = plane_axes(direction);
-        self.order.clear();
-        for (i, (vertex, height)) in (0_u32..).zip(self.surface.vertices.iter().zip(&mut self.heights)) {
-            *height = vertex.dot(direction);
-            self.order.push((rising_bits(*height), i));
-        }
-        // By height, then by index: a total order, so that level vertices are no special case.
-        self.order.sort_unstable();
-        self.jumps.fill(0.0);
-        for (t, (corners, area)) in self.surface.triangles.iter().zip(&self.surface.areas).enumerate() {
+        self.surface.totals.place(direction, &mut self.knots);
+        for (roles, corners) in self.roles.iter_mut().zip(self.surface.triangles) {
             let [i, j, k] = corners.map(|v| v as usize);
-            let [a, b, c] = [i, j, k].map(|v| self.heights[v]);
-            let (d, e, f) = (b - a, c - b, a - c);
-            let scale = area.dot(direction) / (d * e * f);
-            self.jumps[i] += scale * e;
-            self.jumps[j] += scale * f;
-            self.jumps[k] += scale * d;
+            let [a, b, c] = [i, j, k].map(|v| self.knots.heights[v]);
             let lower = |p: f64, v: usize, q: f64, w: usize| u8::from(p < q || (p == q && v < w));
             let (ij, jk, ki) = (lower(a, i, b, j), lower(b, j, c, k), lower(c, k, a, i));
             // How many of the other two are below each.
-            self.roles[t] = ((1 - ij) + ki) | ((1 - jk) + ij) << 2 | ((1 - ki) + jk) << 4;
+            *roles = ((1 - ij) + ki) | ((1 - jk) + ij) << 2 | ((1 - ki) + jk) << 4;
         }
     }
 
@@ -227,7 +204,7 @@ impl<'a> Sweep<'a> {
     fn pass(&mut self, vertex: u32, contours: &mut Contours, measure: &mut DepthMeasure) {
         let surface = self.surface;
         let fan = surface.around(vertex);
-        let (height, jump) = (self.heights[vertex as usize], self.jumps[vertex as usize]);
+        let (height, jump) = (self.knots.heights[vertex as usize], self.knots.jumps[vertex as usize]);
         let mut counts = [0_u32; 4];
         let mut cut = None;
         for &corner in fan {
@@ -282,7 +259,7 @@ impl<'a> Sweep<'a> {
             }
             contours.release(corner / 4);
         }
-        let height = self.heights[vertex as usize];
+        let height = self.knots.heights[vertex as usize];
         let plane = self.plane_below(vertex + 1).at(height);
         for &corner in fan {
             let start = corner / 4;
@@ -306,7 +283,7 @@ impl<'a> Sweep<'a> {
 
     /// The plane just below a vertex.
     fn plane_below(&self, vertex: u32) -> Plane<'_> {
-        let height = self.heights.get(vertex as usize).copied().unwrap_or(0.0);
+        let height = self.knots.heights.get(vertex as usize).copied().unwrap_or(0.0);
         Plane {
             sweep: self,
             height,
@@ -330,7 +307,7 @@ impl Plane<'_> {
 
     #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
     fn is_below(&self, vertex: u32) -> bool {
-        let height = self.sweep.heights[vertex as usize];
+        let height = self.sweep.knots.heights[vertex as usize];
         height < self.height || (height == self.height && vertex < self.vertex)
     }
 
@@ -349,7 +326,7 @@ impl Plane<'_> {
     fn placed(&self, vertex: u32) -> [f64; 3] {
         let position = &self.sweep.surface.vertices[vertex as usize];
         let [x, y] = &self.sweep.axes;
-        [position.dot(x), position.dot(y), self.sweep.heights[vertex as usize]]
+        [position.dot(x), position.dot(y), self.sweep.knots.heights[vertex as usize]]
     }
 
     /// The corners of the contour through a triangle, at a height up to the next vertex.
@@ -400,13 +377,6 @@ impl Plane<'_> {
         state.slope += linear + 2.0 * t * square;
         state.curvature += square;
     }
-}
-
-/// Bits that sort as the number does (finite numbers; -0 sorts below 0, to the same place).
-fn rising_bits(x: f64) -> u64 {
-    // -0 + 0 is 0.
-    let bits = (x + 0.0).to_bits();
-    bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 }
 }
 
 /// Two unit vectors that make a right-handed frame with the direction.

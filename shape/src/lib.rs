@@ -90,7 +90,7 @@ pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, rea
 pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
 pub use section::{SectionPolygon, section_polygons};
-pub use section_areas::SectionAreas;
+pub use section_areas::{Knots, SectionAreas};
 pub use subdivision::Subdivision;
 pub use triangle_mesh::TriangleMesh;
 pub use unit_body::UnitBody;

@@ -53,6 +53,7 @@ mod largest_section;
 mod measures;
 #[cfg(feature = "io")]
 mod mesh_file;
+mod near_points;
 mod nearest;
 #[cfg(feature = "io")]
 mod obj;

@@ -65,7 +65,13 @@ pub(crate) fn normals(mesh: &TriangleMesh, across: &Neighbours) -> Vec<Vector3<f
             normals[t].is_none()
         });
         if without_area.len() == before {
-            break;
+            // Some lean on each other: two back to back along an edge of four vertices or more. One of them takes the normal of any neighbour
+            // that has one; its corners lie on a line, so all edges turn by the same angle.
+            let beside = |t: usize| across[t].iter().find_map(|&other| normals[other as usize]);
+            let Some((place, normal)) = (0..before).find_map(|place| Some((place, beside(without_area[place])?))) else {
+                break;
+            };
+            normals[without_area.swap_remove(place)] = Some(normal);
         }
     }
     normals.into_iter().map(|n| n.unwrap_or_else(Vector3::z)).collect()
@@ -95,8 +101,11 @@ pub(crate) fn signed_mean_width(mesh: &TriangleMesh, across: &Neighbours) -> f64
             let edge = mesh.vertices[corners[(k + 1) % 3] as usize] - mesh.vertices[corners[k] as usize];
             let length = edge.norm();
             if length > 0.0 {
-                let sine = normals[t].cross(&normals[other]).dot(&edge) / length;
-                sum += length * sine.atan2(normals[t].dot(&normals[other]));
+                let along = edge / length;
+                // The angle about the edge: a sliver's normal may be rounded out of the plane across it.
+                let sine = normals[t].cross(&normals[other]).dot(&along);
+                let cosine = normals[t].dot(&normals[other]) - normals[t].dot(&along) * normals[other].dot(&along);
+                sum += length * sine.atan2(cosine);
             }
         }
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::Point3;
 
+use crate::near_points::clusters;
+
 /// Vertices and triangles as a file holds them: open, inverted or broken meshes too.
 ///
 /// [`ClosedMesh`](crate::ClosedMesh) is the checked kind that encloses a solid.
@@ -106,7 +108,7 @@ impl TriangleMesh {
     /// become one. Returns how many vertices went.
     ///
     /// For files whose seams do not quite meet. A tolerance near the length of edges eats them: stay well below. Coordinates must be finite.
-    /// Cost: V log V.
+    /// Cost: about V log V, at any tolerance.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -115,35 +117,11 @@ impl TriangleMesh {
     /// assert_eq!((twice.weld(), twice.weld_within(1e-6)), (0, 8));
     /// ```
     pub fn weld_within(&mut self, tolerance: f64) -> usize {
-        let Some((low, _)) = self.bounding_box() else { return 0 };
         if tolerance.is_nan() || tolerance <= 0.0 {
             return self.weld();
         }
-        // Cells as long as the tolerance: near vertices are in the same or in neighbouring ones.
-        let cell = |i: u32| ((self.vertices[i as usize] - low) / tolerance).map(f64::floor);
-        let mut order: Vec<([f64; 3], u32)> = (0..index(self.vertices.len())).map(|i| (cell(i).into(), i)).collect();
-        let compare = |a: &[f64; 3], b: &[f64; 3]| {
-            let at = |k: usize| a[k].total_cmp(&b[k]);
-            at(0).then(at(1)).then(at(2))
-        };
-        order.sort_unstable_by(|a, b| compare(&a.0, &b.0).then(a.1.cmp(&b.1)));
-        let mut first: Vec<u32> = (0..index(self.vertices.len())).collect();
-        for &(at, i) in &order {
-            for step in 0..9_i32 {
-                let (dx, dy) = (f64::from(step / 3 - 1), f64::from(step % 3 - 1));
-                let from = [at[0] + dx, at[1] + dy, at[2] - 1.0];
-                let to = [at[0] + dx, at[1] + dy, at[2] + 1.0];
-                let start = order.partition_point(|(cell, _)| compare(cell, &from).is_lt());
-                for &(_, j) in order[start..].iter().take_while(|(cell, _)| compare(cell, &to).is_le()) {
-                    if j < i && (self.vertices[i as usize] - self.vertices[j as usize]).norm() < tolerance {
-                        let (a, b) = (root(&first, i), root(&first, j));
-                        first[a.max(b) as usize] = a.min(b);
-                    }
-                }
-            }
-        }
-        let roots: Vec<u32> = (0..index(first.len())).map(|i| root(&first, i)).collect();
-        self.keep_vertices(&roots)
+        let first = clusters(&self.vertices, tolerance);
+        self.keep_vertices(&first)
     }
 
     /// Drops vertices that no triangle uses; returns how many.
@@ -182,14 +160,6 @@ impl TriangleMesh {
     pub(crate) fn corners(&self, t: usize) -> [Point3<f64>; 3] {
         self.triangles[t].map(|i| self.vertices[i as usize])
     }
-}
-
-/// The vertex that stands for the group of `i`.
-fn root(first: &[u32], mut i: u32) -> u32 {
-    while first[i as usize] != i {
-        i = first[i as usize];
-    }
-    i
 }
 
 /// Index of a vertex or triangle in 32 bits; more than fit is refused where meshes are checked.

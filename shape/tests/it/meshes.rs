@@ -294,3 +294,23 @@ fn seams_that_do_not_meet_are_welded_on_request() {
     ));
     assert_relative_eq!(mesh.volume(), 1.0, max_relative = 1e-5);
 }
+
+proptest! {
+    /// Vertices along an edge, which rounding leaves almost on a line: the mean width is that of the box, exactly.
+    #[test]
+    fn vertices_along_an_edge_leave_the_mean_width(edges in prop::array::uniform3(0.1..5.0_f64), turn in prop::array::uniform3(-3.0..3.0_f64), shift in prop::array::uniform3(-300.0..300.0_f64), steps in 1_i32..7) {
+        let rotation = nalgebra::Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
+        let place = |p: Point3<f64>| rotation * p + nalgebra::Vector3::from(shift);
+        let grid: Vec<Point3<f64>> = (0..(steps + 1) * 4)
+            .map(|k| [f64::from(k / 4) / f64::from(steps), f64::from(k & 1), f64::from(k >> 1 & 1)])
+            .map(|at| place(Point3::new(at[0] * edges[0], at[1] * edges[1], at[2] * edges[2])))
+            .collect();
+        let exact = 0.5 * edges.iter().sum::<f64>();
+        let hull = convex_hull(&grid).unwrap();
+        prop_assert!((hull.mean_width() / exact - 1.0).abs() < 1e-9, "{}", hull.mean_width() / exact - 1.0);
+        let fine = closed(TriangleMesh::cuboid(edges)).unwrap().subdivided(stereology_shape::Subdivision::Midpoint, 2);
+        let fine = closed(fine.mapped(|p| place(*p))).unwrap();
+        prop_assert!((fine.mean_width() / exact - 1.0).abs() < 1e-9, "{}", fine.mean_width() / exact - 1.0);
+        prop_assert!((fine.signed_mean_width() / exact - 1.0).abs() < 1e-9, "{}", fine.signed_mean_width() / exact - 1.0);
+    }
+}

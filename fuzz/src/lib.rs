@@ -7,7 +7,7 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use stereology_kmatrix::{SectionLaw, SectionOptions};
-use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TriangleMesh};
+use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TriangleMesh, convex_hull, parse_points};
 
 /// Meshes beyond this are read and checked, but not swept: time goes to small ones.
 const MOST_SWEPT: usize = 400;
@@ -18,6 +18,11 @@ pub fn mesh_file(bytes: &[u8]) {
         if let Ok(mesh) = format.parse(bytes, Path::new("bytes")) {
             solid(mesh);
         }
+    }
+    if let Ok(points) = parse_points(bytes, Path::new("bytes"))
+        && let Ok(hull) = convex_hull(&points)
+    {
+        solid(hull.as_triangle_mesh().clone());
     }
     if let Ok(text) = std::str::from_utf8(bytes)
         && let Ok(sphere) = ControlSphere::from_json(text)

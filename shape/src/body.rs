@@ -85,7 +85,7 @@ pub enum BodyError {
     /// Neither a shape nor a mesh file.
     #[error(
         "{spec:?} is not a shape: write sphere, ellipsoid:A,B,C (semi-axes), box:A,B,C (edges), cylinder:D,L, rock:SEED[,ROUGHNESS], \
-         superellipsoid:A,B,C,E1,E2, hull:FILE, or the name of a mesh (.obj, .stl, .ply) or control-point file (.json)"
+         superellipsoid:A,B,C,E1,E2, hull:FILE (a mesh file, or text rows of x, y, z), or the name of a mesh (.obj, .stl, .ply) or control-point file (.json)"
     )]
     UnknownShape {
         /// What was given.
@@ -100,6 +100,14 @@ pub enum BodyError {
     /// Points have no hull.
     #[error(transparent)]
     Hull(#[from] crate::hull::HullError),
+    /// The points of a file have no hull.
+    #[error("{path}: {source}")]
+    HullOf {
+        /// The file.
+        path: String,
+        /// What is wrong with its points.
+        source: crate::hull::HullError,
+    },
     /// The control points of a file make no surface.
     #[error("{path}: {source}")]
     ControlPoints {
@@ -301,8 +309,8 @@ impl Body {
     }
 
     /// Reads a body from its description: `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`,
-    /// `rock:SEED` or `rock:SEED,ROUGHNESS`, `superellipsoid:A,B,C,E1,E2` (semi-axes, exponents), and with feature `io` `hull:FILE` (of the
-    /// vertices of a mesh file) or the name of a mesh file or of a control-point sphere (.json).
+    /// `rock:SEED` or `rock:SEED,ROUGHNESS`, `superellipsoid:A,B,C,E1,E2` (semi-axes, exponents), and with feature `io` `hull:FILE` (of
+    /// [points](crate::read_points): the vertices of a mesh file, or rows of x, y, z) or the name of a mesh file or of a control-point sphere (.json).
     ///
     /// # Errors
     ///
@@ -354,7 +362,13 @@ impl Body {
                 Self::superellipsoid([a, b, c], [e1, e2])
             }
             #[cfg(feature = "io")]
-            "hull" => Self::hull(&crate::mesh_file::read_mesh(rest)?.vertices),
+            "hull" => Self::hull(&crate::point_file::read_points(rest)?).map_err(|error| match error {
+                BodyError::Hull(source) => BodyError::HullOf {
+                    path: rest.to_owned(),
+                    source,
+                },
+                other => other,
+            }),
             _ => Self::from_file(spec, weld),
         }
     }

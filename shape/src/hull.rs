@@ -12,7 +12,7 @@ use crate::winding::coord;
 #[non_exhaustive]
 pub enum HullError {
     /// Fewer than four points.
-    #[error("a hull needs at least four points, there are {count}")]
+    #[error("a hull needs at least four points, not all in one plane; there are {count}")]
     TooFewPoints {
         /// How many points there are.
         count: usize,

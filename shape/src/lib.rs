@@ -62,6 +62,8 @@ mod periodic_box;
 #[cfg(feature = "io")]
 mod ply;
 #[cfg(feature = "io")]
+#[cfg(feature = "io")]
+mod point_file;
 mod polygon;
 mod primitives;
 mod rock;
@@ -90,6 +92,8 @@ pub use hull::{HullError, convex_hull};
 pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};
 pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
+#[cfg(feature = "io")]
+pub use point_file::{parse_points, read_points};
 pub use section::{SectionPolygon, section_polygons};
 pub use section_areas::{Knots, SectionAreas};
 pub use subdivision::Subdivision;

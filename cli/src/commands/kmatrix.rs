@@ -7,6 +7,7 @@ use stereology::kmatrix::{
 };
 use stereology::shape::Body;
 
+use super::shape::tell_repairs;
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::failure::{Explain, Failure, body_welding};
@@ -128,18 +129,7 @@ impl Kmatrix {
             .field("cdf", json!({ "x": x, "f": f }))
             .field("directions", law.directions())
             .field("rotations", law.rotations());
-        let repairs: Vec<String> = mesh
-            .map_or(&[][..], |mesh| mesh.repairs())
-            .iter()
-            .map(ToString::to_string)
-            .collect();
-        if !repairs.is_empty() {
-            answer.warn(Warning::new(
-                "mesh-repaired",
-                format!("{}: {}", self.shape, repairs.join("; ")),
-            ));
-        }
-        answer.field("repairs", repairs);
+        tell_repairs(&self.shape, &body, &mut answer);
         self.warn(&body, &law, &mut answer);
         self.describe(&law, &rows, &mut answer);
         Ok(answer)

@@ -16,15 +16,19 @@ use crate::warnings::Warning;
 /// A shape as a mesh file
 ///
 /// SPEC is a SHAPE (`sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file), a rough rock `rock:SEED,ROUGHNESS` (0.02 worn, 0.1
-/// jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes; exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the hull of a mesh file's
-/// vertices `hull:FILE`, or a sphere edited by its control points (.json), as the paper's particles were made.
+/// jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes; exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of points
+/// `hull:FILE`, or a sphere edited by its control points (.json), as the paper's particles were made.
+///
+/// The FILE of a hull is a mesh file, of which the vertices are taken, or text (.csv, .xyz, .txt): a point a row, x, y, z separated by commas, semicolons,
+/// tabs or blanks. A header may name the columns x, y, z in any order; without one the first three are taken. Rows that begin with # are skipped.
 ///
 /// A sphere or an ellipsoid written to a .json file gives the control points to start from. What is written can be given as SHAPE to every other command.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology shape superellipsoid:1,1,0.5,0.5,0.5 -o pillow.obj\n          \
                              stereology shape sphere -o pebble.json     (edit it, then:)\n          \
-                             stereology shape pebble.json --subdivide 1 --scheme loop -o pebble.ply"
+                             stereology shape pebble.json --subdivide 1 --scheme loop -o pebble.ply\n          \
+                             stereology shape hull:corners.csv -o grain.obj"
 )]
 pub struct Shape {
     /// What to write
@@ -125,18 +129,6 @@ impl Shape {
 
     fn tell(&self, body: &Body, written: Option<&TriangleMesh>, answer: &mut Answer) {
         let name = |path: &Path| path.display().to_string();
-        let repairs: Vec<String> = body
-            .mesh()
-            .map_or(&[][..], |mesh| mesh.repairs())
-            .iter()
-            .map(ToString::to_string)
-            .collect();
-        if !repairs.is_empty() {
-            answer.warn(Warning::new(
-                "mesh-repaired",
-                format!("{}: {}", self.spec, repairs.join("; ")),
-            ));
-        }
         answer
             .field("shape", self.spec.as_str())
             .field("output", name(&self.output))
@@ -149,7 +141,6 @@ impl Shape {
             .field("max_area", body.largest_section_area())
             .field("size", body.size())
             .field("convex", body.is_convex())
-            .field("repairs", repairs)
             .line(format!(
                 "{}: {} triangles, volume {}, surface {}, mean caliper {}, size {} -> {}",
                 self.spec,
@@ -160,5 +151,20 @@ impl Shape {
                 significant(body.size()),
                 name(&self.output)
             ));
+        tell_repairs(&self.spec, body, answer);
     }
+}
+
+/// What was mended of a mesh: the field `repairs`, and a warning if there was anything.
+pub fn tell_repairs(spec: &str, body: &Body, answer: &mut Answer) {
+    let repairs: Vec<String> = body
+        .mesh()
+        .map_or(&[][..], |mesh| mesh.repairs())
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    if !repairs.is_empty() {
+        answer.warn(Warning::new("mesh-repaired", format!("{spec}: {}", repairs.join("; "))));
+    }
+    answer.field("repairs", repairs);
 }

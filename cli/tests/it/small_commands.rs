@@ -404,3 +404,32 @@ fn shapes_are_written_and_read_back() {
     let (code, _, error) = stereology(&["shape", "rock:3", "-o", &path(&folder, "a.obj")]);
     assert!(code == 1 && error.contains("--force"), "{error}");
 }
+
+/// A hull of points in a text file is a SHAPE; a file that holds none is refused with its line.
+#[test]
+fn hulls_of_points_in_text_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let file = path(&folder, name);
+        std::fs::write(&file, text).unwrap();
+        format!("hull:{file}")
+    };
+    let corners = "0 0 0\n2 0 0\n0 3 0\n2 3 0\n0 0 1\n2 0 1\n0 3 1\n2 3 1\n1 1 0.5\n";
+    for spec in [
+        write("brick.xyz", corners),
+        write("brick.csv", &format!("x,y,z\n{}", corners.replace(' ', ","))),
+    ] {
+        let brick = answer(&["kmatrix", &spec, "--directions", "64"]);
+        assert!((brick["volume"].as_f64().unwrap() - 6.0).abs() < 1e-9);
+        assert!((brick["caliper_hull"].as_f64().unwrap() - 3.0).abs() < 1e-9);
+    }
+    for (spec, says) in [
+        (write("flat.csv", "0,0,0\n1,0,0\n0,1,0\n1,1,0\n"), "one plane"),
+        (write("few.csv", "0,0,0\n1,0,0\n"), "at least four points"),
+        (write("words.csv", "x,y,z\n1,2,3\n1,two,3\n"), "line 3: \"two\""),
+        (format!("hull:{}", path(&folder, "none.csv")), "none.csv"),
+    ] {
+        let (code, _, error) = stereology(&["kmatrix", &spec]);
+        assert!(code == 1 && error.contains(says), "{code} {error}");
+    }
+}

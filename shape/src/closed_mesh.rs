@@ -6,7 +6,7 @@ use crate::hull::hull_mesh;
 use crate::measures;
 use crate::self_intersection::first_crossing;
 use crate::topology::{self, Neighbours};
-use crate::triangle_mesh::TriangleMesh;
+use crate::triangle_mesh::{TriangleMesh, flush_tiny};
 use crate::winding::ray_crossing;
 
 /// A closed, oriented, manifold triangle mesh with a volume; the only way to a section law.
@@ -49,6 +49,11 @@ pub struct ClosedMesh {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Repair {
+    /// Coordinates that are far below the rounding of the largest were set to zero.
+    FlushedCoordinates {
+        /// How many.
+        count: usize,
+    },
     /// Vertices at exactly the position of another were joined with it.
     WeldedVertices {
         /// How many.
@@ -89,6 +94,9 @@ pub enum Repair {
 impl std::fmt::Display for Repair {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::FlushedCoordinates { count } => {
+                write!(f, "{count} coordinates below 1e-20 of the largest were set to 0")
+            }
             Self::WeldedVertices { count } => {
                 write!(f, "{count} vertices were joined with others at the same position")
             }
@@ -239,6 +247,8 @@ impl ClosedMesh {
             }
         };
         check_numbers(&mesh)?;
+        let count = flush_tiny(&mut mesh.vertices);
+        note(count, Repair::FlushedCoordinates { count });
         let count = mesh.weld();
         note(count, Repair::WeldedVertices { count });
         if tolerance > 0.0 {

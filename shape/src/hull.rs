@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use robust::orient3d;
 
 use crate::closed_mesh::ClosedMesh;
-use crate::triangle_mesh::{TriangleMesh, index};
+use crate::triangle_mesh::{TriangleMesh, flush_tiny, index};
 use crate::winding::coord;
 
 /// Why points have no hull with a volume.
@@ -31,7 +31,8 @@ pub enum HullError {
     Extent,
 }
 
-/// Convex hull as a closed triangle mesh; its vertices are a subset of the points, bit for bit.
+/// Convex hull as a closed triangle mesh; its vertices are a subset of the points, bit for bit (but that coordinates
+/// below 1e-20 of the largest are zero).
 ///
 /// Quickhull (Barber, Dobkin & Huhdanpaa 1996) whose every decision is the exact sign of a determinant (Shewchuk 1997): no point is
 /// outside the result, whatever the rounding. Cost: about n log n.
@@ -70,20 +71,19 @@ pub(crate) fn hull_mesh(points: &[Point3<f64>]) -> Result<TriangleMesh, HullErro
     if points.len() < 4 {
         return Err(HullError::TooFewPoints { count: points.len() });
     }
-    let mut hull = Quickhull::start(points)?;
+    let mut points = points.to_vec();
+    flush_tiny(&mut points);
+    let mut hull = Quickhull::start(&points)?;
     while let Some(face) = hull.pending.pop() {
         if hull.faces[face].alive && !hull.faces[face].outside.is_empty() {
             hull.raise(face);
         }
     }
+    let faces = hull.faces.iter().filter(|face| face.alive);
+    let triangles = faces.map(|face| face.corners).collect();
     let mut mesh = TriangleMesh {
-        vertices: points.to_vec(),
-        triangles: hull
-            .faces
-            .iter()
-            .filter(|face| face.alive)
-            .map(|face| face.corners)
-            .collect(),
+        vertices: points,
+        triangles,
     };
     mesh.drop_unused_vertices();
     Ok(mesh)

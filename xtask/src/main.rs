@@ -1,6 +1,7 @@
 //! `cargo xtask`: the work on the workspace that is not the program itself.
 
 mod acceptance;
+mod bench_report;
 mod figures;
 mod label_scores;
 mod particle_noise;
@@ -45,6 +46,12 @@ enum Task {
         /// Only those whose name holds this
         only: Option<String>,
     },
+    /// Times our tasks beside other programs' and writes docs/bench-report.md; run it in release
+    BenchReport {
+        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx); without it our times stand alone
+        #[arg(long)]
+        python: Option<PathBuf>,
+    },
     /// Makes the built-in sample and its truth anew
     Sample,
     /// Runs all that has to pass before a change lands
@@ -70,6 +77,7 @@ fn main() -> Result<()> {
             Ok(())
         }
         Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
+        Task::BenchReport { python } => bench_report::run(&root()?.join("docs/bench-report.md"), python.as_deref()),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),
     }

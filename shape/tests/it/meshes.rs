@@ -314,3 +314,18 @@ proptest! {
         prop_assert!((fine.signed_mean_width() / exact - 1.0).abs() < 1e-9, "{}", fine.signed_mean_width() / exact - 1.0);
     }
 }
+
+/// Coordinates so small that products of them vanish (found by fuzzing): a needle of no thickness beside a box.
+#[test]
+fn vanishing_coordinates_are_set_to_zero_and_said() {
+    let mut dented = cube().mapped(|p| Point3::new(p.x + 0.5, p.y + 0.5, p.z + 0.5));
+    dented.vertices[0].x = 1e-320;
+    dented.vertices[1].y = -3e-231;
+    let mesh = closed(dented).unwrap();
+    assert_eq!(mesh.repairs(), [Repair::FlushedCoordinates { count: 2 }]);
+    assert_relative_eq!(mesh.mean_width(), 1.5, max_relative = 1e-12);
+    let needle = TriangleMesh::cuboid([1e-231, 1e-300, 4.0]);
+    let alone = closed(needle.with(&cube())).unwrap();
+    assert_relative_eq!(alone.volume(), 1.0, max_relative = 1e-12);
+    assert!(alone.repairs().iter().any(|repair| matches!(repair, Repair::DroppedDegenerate { .. })));
+}

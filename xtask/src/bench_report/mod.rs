@@ -1,0 +1,182 @@
+//! `cargo xtask bench-report`: whole tasks of ours beside the programs people take for them today, timed in one run on one machine, as ratios.
+//!
+//! A section is a file beside this one: a function that times a few tasks, ours and the peer's, and a line in [`SECTIONS`]. The peer's side is a
+//! Python script of our own next to it, run by the interpreter that `--python` names; where the peer is not installed, the section says so and has
+//! our times alone.
+
+mod section_law;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use rayon::ThreadPool;
+use serde_json::Value;
+
+/// What is measured, in the order of the report.
+const SECTIONS: [fn(&Bench) -> Result<Section>; 1] = [section_law::measure];
+
+/// Our tasks against one peer's.
+struct Section {
+    title: &'static str,
+    /// What was done by whom, what is counted and what is not.
+    words: String,
+    /// Name and version of the peer, or why there is none.
+    peer: Result<String, String>,
+    rows: Vec<Row>,
+}
+
+/// One task; CPU seconds of one core.
+struct Row {
+    task: String,
+    ours: f64,
+    peer: Option<f64>,
+    /// Whether both came to the same answer.
+    remark: String,
+}
+
+/// Where times are taken.
+struct Bench {
+    python: Option<PathBuf>,
+    /// One thread, so that its processor time is all of it.
+    one_core: ThreadPool,
+}
+
+impl Bench {
+    /// The fewest CPU seconds that one of `runs` runs took, and what the last one answered.
+    fn time<T: Send>(&self, runs: u32, task: impl Fn() -> Result<T> + Sync) -> Result<(f64, T)> {
+        self.one_core.install(|| {
+            let mut best = f64::INFINITY;
+            let mut answer = None;
+            for _ in 0..runs.max(1) {
+                let start = cpu_seconds()?;
+                answer = Some(task()?);
+                best = best.min(cpu_seconds()? - start);
+            }
+            Ok((best, answer.context("at least one run")?))
+        })
+    }
+
+    /// What a script of ours prints, a JSON object with `version`; or why the peer cannot be asked.
+    fn ask_peer(&self, name: &str, script: &str, arguments: &[String]) -> Result<Result<Value, String>> {
+        let Some(python) = &self.python else {
+            return Ok(Err("not measured: no --python was given".to_owned()));
+        };
+        let output = Command::new(python)
+            .args(["-c", script])
+            .args(arguments)
+            .env("OPENBLAS_NUM_THREADS", "1")
+            .env("OMP_NUM_THREADS", "1")
+            .output()
+            .with_context(|| format!("{} cannot be run", python.display()))?;
+        ensure!(
+            output.status.success(),
+            "the peer's script failed: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let answer: Value = serde_json::from_slice(&output.stdout).context("the peer's script printed no JSON")?;
+        Ok(match answer.get("missing").and_then(Value::as_str) {
+            Some(missing) => Err(format!("not measured: {name} is not whole in that Python ({missing})")),
+            None => Ok(answer),
+        })
+    }
+}
+
+/// Processor time of this thread.
+fn cpu_seconds() -> Result<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat")
+        .context("processor times are read from /proc/thread-self/schedstat, which only Linux has")?;
+    let nanoseconds: f64 = text.split_whitespace().next().context("an empty schedstat")?.parse()?;
+    Ok(1e-9 * nanoseconds)
+}
+
+/// Times everything and writes the report.
+pub fn run(document: &Path, python: Option<&Path>) -> Result<()> {
+    let bench = Bench {
+        python: python.map(Path::to_owned),
+        one_core: rayon::ThreadPoolBuilder::new().num_threads(1).build()?,
+    };
+    let mut text = format!(
+        "# Times beside other programs\n\nWritten by `cargo run --release -p xtask -- bench-report --python PYTHON`. CPU seconds of one core, the \
+         fewest of several runs, all in one run of the report on {}; ratios carry over to other machines better than seconds.\n",
+        processor()
+    );
+    for section in SECTIONS {
+        let section = section(&bench)?;
+        println!("{}: {} tasks", section.title, section.rows.len());
+        text += &markdown(&section);
+    }
+    std::fs::write(document, text).with_context(|| format!("{} cannot be written", document.display()))
+}
+
+/// The processor's name, where the system tells it.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("model name"));
+    line.map_or("a machine without a name", |name| name.trim_start_matches([' ', '\t', ':']))
+        .to_owned()
+}
+
+fn markdown(section: &Section) -> String {
+    let (peer, who) = match &section.peer {
+        Ok(version) => (version.as_str(), "the peer"),
+        Err(missing) => (missing.as_str(), "peer"),
+    };
+    let mut text = format!(
+        "\n## {}\n\n{}\n\nPeer: {peer}.\n\n| task | ours, s | {who}, s | ratio | |\n|---|---|---|---|---|\n",
+        section.title, section.words
+    );
+    for row in &section.rows {
+        let (seconds, ratio) = match row.peer {
+            Some(peer) => (significant(peer), format!("{}×", significant(peer / row.ours))),
+            None => ("–".to_owned(), "–".to_owned()),
+        };
+        text += &format!(
+            "| {} | {} | {seconds} | {ratio} | {} |\n",
+            row.task,
+            significant(row.ours),
+            row.remark
+        );
+    }
+    text
+}
+
+/// Two digits that count.
+fn significant(x: f64) -> String {
+    if x <= 0.0 || !x.is_finite() {
+        return "0".to_owned();
+    }
+    let digits = (1.0 - x.log10().floor()).max(0.0);
+    let unit = 10.0_f64.powf(1.0 - x.log10().floor());
+    format!("{:.*}", digits as usize, (x * unit).round() / unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Row, Section, markdown, significant};
+
+    #[test]
+    fn numbers_have_two_digits() {
+        assert_eq!([0.000_613, 0.0367, 1.24, 12.5, 1234.0].map(significant), ["0.00061", "0.037", "1.2", "13", "1200"]);
+    }
+
+    /// Without the peer our times stand alone, and the report says why.
+    #[test]
+    fn a_missing_peer_is_said() {
+        let section = |peer, seconds| Section {
+            title: "T",
+            words: "w".to_owned(),
+            peer,
+            rows: vec![Row {
+                task: "cube".to_owned(),
+                ours: 0.5,
+                peer: seconds,
+                remark: String::new(),
+            }],
+        };
+        let alone = markdown(&section(Err("not measured: no --python was given".to_owned()), None));
+        assert!(alone.contains("Peer: not measured") && alone.contains("| cube | 0.50 | – | – |"), "{alone}");
+        let both = markdown(&section(Ok("trimesh 4".to_owned()), Some(5.0)));
+        assert!(both.contains("| cube | 0.50 | 5.0 | 10× |"), "{both}");
+    }
+}

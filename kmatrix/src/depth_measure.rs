@@ -112,7 +112,11 @@ impl DepthMeasure {
         let sign = 1.0_f64.copysign(end - a);
         // On a falling stretch what is below the bound comes after the root.
         let (offset, turned) = if end > a { (0.0, 1.0) } else { (length, -1.0) };
-        let stop = start + self.bounds[start..last].iter().take_while(|bound| **bound < most).count();
+        let stop = start
+            + self.bounds[start..last]
+                .iter()
+                .take_while(|bound| **bound < most)
+                .count();
         // Without a way out of the loop several roots are taken at once.
         for (bound, crossing) in self.bounds[start..stop].iter().zip(&mut self.crossing[start..stop]) {
             // The root on the monotone stretch; b and the root have the sign of the direction, so nothing cancels.

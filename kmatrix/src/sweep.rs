@@ -326,7 +326,11 @@ impl Plane<'_> {
     fn placed(&self, vertex: u32) -> [f64; 3] {
         let position = &self.sweep.surface.vertices[vertex as usize];
         let [x, y] = &self.sweep.axes;
-        [position.dot(x), position.dot(y), self.sweep.knots.heights[vertex as usize]]
+        [
+            position.dot(x),
+            position.dot(y),
+            self.sweep.knots.heights[vertex as usize],
+        ]
     }
 
     /// The corners of the contour through a triangle, at a height up to the next vertex.

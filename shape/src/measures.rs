@@ -68,7 +68,8 @@ pub(crate) fn normals(mesh: &TriangleMesh, across: &Neighbours) -> Vec<Vector3<f
             // Some lean on each other: two back to back along an edge of four vertices or more. One of them takes the normal of any neighbour
             // that has one; its corners lie on a line, so all edges turn by the same angle.
             let beside = |t: usize| across[t].iter().find_map(|&other| normals[other as usize]);
-            let Some((place, normal)) = (0..before).find_map(|place| Some((place, beside(without_area[place])?))) else {
+            let Some((place, normal)) = (0..before).find_map(|place| Some((place, beside(without_area[place])?)))
+            else {
                 break;
             };
             normals[without_area.swap_remove(place)] = Some(normal);

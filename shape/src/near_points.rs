@@ -113,7 +113,9 @@ impl Search<'_> {
     }
 
     fn join_within(&mut self, branch: usize) {
-        let Branch { low, high, children, .. } = self.branches[branch];
+        let Branch {
+            low, high, children, ..
+        } = self.branches[branch];
         if (high - low).norm() < self.length {
             return self.unite_all(branch);
         }
@@ -143,7 +145,8 @@ impl Search<'_> {
             return self.unite(self.order[self.branches[a].from], self.order[self.branches[b].from]);
         }
         // The larger box is opened.
-        let opens_a = q.children.is_none() || (p.children.is_some() && (p.high - p.low).norm() >= (q.high - q.low).norm());
+        let opens_a =
+            q.children.is_none() || (p.children.is_some() && (p.high - p.low).norm() >= (q.high - q.low).norm());
         let (opened, other) = if opens_a { (a, b) } else { (b, a) };
         match self.branches[opened].children {
             Some(children) => children.iter().for_each(|&child| self.join(child, other)),
@@ -208,7 +211,13 @@ mod tests {
     #[test]
     fn any_length_is_quick() {
         let points: Vec<Point3<f64>> = (0..100_000_u32)
-            .map(|k| Point3::new(f64::from(k % 224), f64::from(k / 224 % 224), f64::from(k / 224 / 224 * 100)))
+            .map(|k| {
+                Point3::new(
+                    f64::from(k % 224),
+                    f64::from(k / 224 % 224),
+                    f64::from(k / 224 / 224 * 100),
+                )
+            })
             .collect();
         let count = |length: f64| {
             let first = clusters(&points, length);

@@ -61,7 +61,10 @@ pub fn parse_points(bytes: &[u8], name: &Path) -> Result<Vec<Point3<f64>>, MeshF
 
 fn rows(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Fault> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
-        let lines = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count();
+        let lines = bytes[..error.valid_up_to()]
+            .iter()
+            .filter(|&&byte| byte == b'\n')
+            .count();
         let expected = MeshFileFault::Expected {
             expected: "text: rows of x, y, z (or a mesh file, .obj, .stl or .ply)",
             found: "bytes that are no text".to_owned(),
@@ -105,14 +108,17 @@ fn words(line: &str) -> Vec<&str> {
 
 /// Where a header has the columns x, y and z.
 fn header(words: &[&str]) -> Option<[usize; 3]> {
-    let place = |name: &str| words.iter().position(|word| word.trim_matches('"').eq_ignore_ascii_case(name));
+    let place = |name: &str| {
+        words
+            .iter()
+            .position(|word| word.trim_matches('"').eq_ignore_ascii_case(name))
+    };
     Some([place("x")?, place("y")?, place("z")?])
 }
 
 fn point(words: &[&str], columns: [usize; 3], line: usize) -> Result<Point3<f64>, Fault> {
-    let at = |column: usize| {
-        coordinate(words.get(column).copied()).map_err(|fault| (MeshFilePlace::Line(line + 1), fault))
-    };
+    let at =
+        |column: usize| coordinate(words.get(column).copied()).map_err(|fault| (MeshFilePlace::Line(line + 1), fault));
     Ok(Point3::new(at(columns[0])?, at(columns[1])?, at(columns[2])?))
 }
 
@@ -141,10 +147,15 @@ mod tests {
 
     #[test]
     fn faults_name_their_line() {
-        assert_eq!(parse("x,y,z\n1,2,3\n4,5\n").unwrap_err(), "p.csv: line 3: \"\" is not a finite coordinate");
+        assert_eq!(
+            parse("x,y,z\n1,2,3\n4,5\n").unwrap_err(),
+            "p.csv: line 3: \"\" is not a finite coordinate"
+        );
         assert!(parse("1,2,3\n4,nan,6\n").unwrap_err().contains("line 2: \"nan\""));
         assert!(parse("1,2,3\n1,2,three\n").unwrap_err().contains("line 2: \"three\""));
-        let error = parse_points(b"1,2,3\n\xff\xfe", "p.xyz".as_ref()).unwrap_err().to_string();
+        let error = parse_points(b"1,2,3\n\xff\xfe", "p.xyz".as_ref())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("line 2: expected text"), "{error}");
         assert!(parse("Na 1 2 3\n").unwrap_err().contains("line 1: \"Na\""));
         assert_eq!(parse("").unwrap(), []);

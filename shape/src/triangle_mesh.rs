@@ -165,7 +165,10 @@ impl TriangleMesh {
 /// Sets coordinates to zero that are less than 1e-20 of the largest, and tells how many: they are far below its rounding, and products of three
 /// of them would leave the range in which predicates are exact.
 pub(crate) fn flush_tiny(points: &mut [Point3<f64>]) -> usize {
-    let largest = points.iter().flat_map(|p| p.iter()).fold(0.0_f64, |most, x| most.max(x.abs()));
+    let largest = points
+        .iter()
+        .flat_map(|p| p.iter())
+        .fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut count = 0;
     for x in points.iter_mut().flat_map(|p| p.iter_mut()) {
         if *x != 0.0 && x.abs() < 1e-20 * largest {

@@ -162,20 +162,33 @@ fn judge(name: &str, exact: &Quadrature, body: &Body, slack: f64) {
     assert_relative_eq!(body.mean_width(), exact.caliper, max_relative = 1e-3);
     for seed in 0..4 {
         let tolerance = if seed == 0 { 3e-4 } else { 2e-3 };
-        let options = SectionOptions::default().with_bins(BINS).with_tolerance(tolerance).with_seed(seed);
+        let options = SectionOptions::default()
+            .with_bins(BINS)
+            .with_tolerance(tolerance)
+            .with_seed(seed);
         let law = SectionLaw::of_body(body, &options).unwrap();
         let (matrix, error) = (law.k_matrix(BINS), law.standard_error(BINS));
         assert!(error > 0.0 && error <= tolerance);
         for i in 0..BINS {
             for j in i..BINS {
                 let apart = (matrix[(i, j)] - exact.matrix[i][j]).abs();
-                assert!(apart <= ALARM * error + slack, "{name}, seed {seed}, ({i}, {j}): {apart} apart, error {error}");
+                assert!(
+                    apart <= ALARM * error + slack,
+                    "{name}, seed {seed}, ({i}, {j}): {apart} apart, error {error}"
+                );
             }
         }
         let energy_error = law.mean_square_section_area_standard_error() * law.caliper_hull();
         let apart = (law.self_energy() - exact.energy).abs();
-        assert!(apart <= ALARM * energy_error + 2e-3 * exact.energy, "{name}: energy {apart} apart");
-        assert_relative_eq!(law.mean_profile_area(), exact.volume / exact.caliper, max_relative = 2e-3);
+        assert!(
+            apart <= ALARM * energy_error + 2e-3 * exact.energy,
+            "{name}: energy {apart} apart"
+        );
+        assert_relative_eq!(
+            law.mean_profile_area(),
+            exact.volume / exact.caliper,
+            max_relative = 2e-3
+        );
     }
 }
 
@@ -198,7 +211,11 @@ fn cylinders_have_the_law_of_their_closed_form() {
     for (diameter, length) in [(1.0, 2.0), (1.0, 0.3), (1.0, 1.0)] {
         let exact = quadrature(&Can(0.5 * diameter, 0.5 * length));
         assert_relative_eq!(exact.caliper, 0.5 * length + 0.25 * PI * diameter, max_relative = 3e-4);
-        assert_relative_eq!(exact.volume, 0.25 * PI * diameter * diameter * length, max_relative = 1e-3);
+        assert_relative_eq!(
+            exact.volume,
+            0.25 * PI * diameter * diameter * length,
+            max_relative = 1e-3
+        );
         let mesh = body(TriangleMesh::cylinder(diameter, length, 360));
         judge(&format!("cylinder {diameter} x {length}"), &exact, &mesh, 5e-4);
     }
@@ -207,5 +224,10 @@ fn cylinders_have_the_law_of_their_closed_form() {
 /// The program's own cylinder, of 128 sides, is as good.
 #[test]
 fn cylinder_of_128_sides_is_a_cylinder_to_a_thousandth() {
-    judge("cylinder", &quadrature(&Can(0.5, 1.0)), &Body::cylinder(1.0, 2.0).unwrap(), 1e-3);
+    judge(
+        "cylinder",
+        &quadrature(&Can(0.5, 1.0)),
+        &Body::cylinder(1.0, 2.0).unwrap(),
+        1e-3,
+    );
 }

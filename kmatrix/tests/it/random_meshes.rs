@@ -30,15 +30,22 @@ fn prism(radii: &[f64], height: f64) -> TriangleMesh {
     let top = sides + 1;
     for k in 0..sides {
         let (a, b) = (k + 1, (k + 1) % sides + 1);
-        mesh.triangles
-            .extend([[0, b, a], [top, top + a, top + b], [a, b, top + b], [a, top + b, top + a]]);
+        mesh.triangles.extend([
+            [0, b, a],
+            [top, top + a, top + b],
+            [a, b, top + b],
+            [a, top + b, top + a],
+        ]);
     }
     mesh
 }
 
 /// Cubes of a grid of 3³; solids that touch themselves in an edge or corner are left out.
 fn union(mask: u32) -> Option<TriangleMesh> {
-    let cells: Vec<[i32; 3]> = (0..27).filter(|k| mask >> k & 1 == 1).map(|k| [k % 3, k / 3 % 3, k / 9]).collect();
+    let cells: Vec<[i32; 3]> = (0..27)
+        .filter(|k| mask >> k & 1 == 1)
+        .map(|k| [k % 3, k / 3 % 3, k / 9])
+        .collect();
     let mesh = cubes(&cells);
     ClosedMesh::try_from(mesh.clone()).ok().map(|_| mesh)
 }
@@ -49,7 +56,8 @@ fn solids() -> impl Strategy<Value = TriangleMesh> {
         (0_u64..1000).prop_map(|seed| Body::rock(seed).to_triangles(0)),
         prop::array::uniform3(edge.clone()).prop_map(TriangleMesh::cuboid),
         (prop::collection::vec(0.4..1.6_f64, 5..12), edge.clone()).prop_map(|(radii, height)| prism(&radii, height)),
-        (0.3..0.9_f64, 8_u32..20, 5_u32..10).prop_map(|(tube, around, across)| TriangleMesh::torus(2.0, tube, around, across)),
+        (0.3..0.9_f64, 8_u32..20, 5_u32..10)
+            .prop_map(|(tube, around, across)| TriangleMesh::torus(2.0, tube, around, across)),
         (1_u32..1 << 27).prop_filter_map("touches itself", |mask| union(mask | 1 << 13)),
         Just(union(!(1 << 13)).unwrap()),
         (0_u64..1000).prop_map(|seed| {
@@ -57,10 +65,15 @@ fn solids() -> impl Strategy<Value = TriangleMesh> {
             rock.clone().with(&placed(&rock, [0.3, 0.2, 0.1], 0.7, [2.0, 0.5, 0.0]))
         }),
     ];
-    (mesh, prop::array::uniform3(0.6..1.6_f64), prop::array::uniform3(-3.0..3.0_f64)).prop_map(|(mesh, stretch, turn)| {
-        let stretched = mesh.mapped(|p| Point3::from(p.coords.component_mul(&Vector3::from(stretch))));
-        placed(&stretched, turn, 1.0, [0.5, -2.0, 1.0])
-    })
+    (
+        mesh,
+        prop::array::uniform3(0.6..1.6_f64),
+        prop::array::uniform3(-3.0..3.0_f64),
+    )
+        .prop_map(|(mesh, stretch, turn)| {
+            let stretched = mesh.mapped(|p| Point3::from(p.coords.component_mul(&Vector3::from(stretch))));
+            placed(&stretched, turn, 1.0, [0.5, -2.0, 1.0])
+        })
 }
 
 /// ½ ∬ dx dy / |x − y| over the solid, by the divergence theorem twice: −¼ ∮∮ |x − y| n·n′ dS dS′, smooth but for the kink where x = y.
@@ -77,7 +90,10 @@ fn self_energy(mesh: &TriangleMesh) -> f64 {
         .collect();
     let mut sum = 0.0;
     for (k, (x, at_x)) in points.iter().enumerate() {
-        sum += points[..k].iter().map(|(y, at_y)| (x - y).norm() * at_x.dot(at_y)).sum::<f64>();
+        sum += points[..k]
+            .iter()
+            .map(|(y, at_y)| (x - y).norm() * at_x.dot(at_y))
+            .sum::<f64>();
     }
     -0.5 * sum
 }
@@ -85,7 +101,9 @@ fn self_energy(mesh: &TriangleMesh) -> f64 {
 /// The mesh with each triangle in four until there are several hundred.
 fn finer(mesh: &TriangleMesh) -> TriangleMesh {
     let closed = ClosedMesh::try_from(mesh.clone()).unwrap();
-    let times = (0..4).find(|times| mesh.triangles.len() << (2 * times) >= 600).unwrap_or(4);
+    let times = (0..4)
+        .find(|times| mesh.triangles.len() << (2 * times) >= 600)
+        .unwrap_or(4);
     closed.subdivided(Subdivision::Midpoint, times)
 }
 
@@ -204,6 +222,10 @@ fn rough_rocks_obey_too() {
         assert!(law.profiles_per_hit() >= 1.0);
         let energy = self_energy(&rock.to_triangles(0));
         let error = law.mean_square_section_area_standard_error() * law.caliper_hull();
-        assert!((law.self_energy() - energy).abs() < ALARM * error + 3e-3 * energy, "{} {energy}", law.self_energy());
+        assert!(
+            (law.self_energy() - energy).abs() < ALARM * error + 3e-3 * energy,
+            "{} {energy}",
+            law.self_energy()
+        );
     }
 }

@@ -327,5 +327,10 @@ fn vanishing_coordinates_are_set_to_zero_and_said() {
     let needle = TriangleMesh::cuboid([1e-231, 1e-300, 4.0]);
     let alone = closed(needle.with(&cube())).unwrap();
     assert_relative_eq!(alone.volume(), 1.0, max_relative = 1e-12);
-    assert!(alone.repairs().iter().any(|repair| matches!(repair, Repair::DroppedDegenerate { .. })));
+    assert!(
+        alone
+            .repairs()
+            .iter()
+            .any(|repair| matches!(repair, Repair::DroppedDegenerate { .. }))
+    );
 }

@@ -15,11 +15,15 @@ const PLANES: usize = 400;
 
 pub fn measure(bench: &Bench) -> Result<Section> {
     let meshes = [
-        ("cube", TriangleMesh::cuboid([1.0; 3]), 200),
-        ("rock, convex", Body::rock(1).to_triangles(0), 50),
-        ("round rock, convex", Body::ellipsoid([1.0, 0.8, 0.6])?.to_triangles(3), 10),
-        ("torus", TriangleMesh::torus(2.0, 0.5, 100, 50), 3),
-        ("rough rock", Body::rough_rock(1, 0.05)?.to_triangles(0), 3),
+        ("cube", TriangleMesh::cuboid([1.0; 3]), 400),
+        ("rock, convex", Body::rock(1).to_triangles(0), 200),
+        (
+            "round rock, convex",
+            Body::ellipsoid([1.0, 0.8, 0.6])?.to_triangles(3),
+            40,
+        ),
+        ("torus", TriangleMesh::torus(2.0, 0.5, 100, 50), 1),
+        ("rough rock", Body::rough_rock(1, 0.05)?.to_triangles(0), 1),
     ];
     let folder = std::env::temp_dir().join(format!("stereology-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
@@ -35,7 +39,8 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     removed?;
     let mut rows = Vec::new();
     for (k, (name, mesh, runs)) in meshes.iter().enumerate() {
-        let (checking, body) = bench.time(1, || Ok(Body::from_mesh(ClosedMesh::try_from(mesh.clone())?)))?;
+        let checks = runs.div_ceil(10);
+        let (checking, body) = bench.time(checks, || Ok(Body::from_mesh(ClosedMesh::try_from(mesh.clone())?)))?;
         let options = SectionOptions::default().with_bins(BINS).with_tolerance(TOLERANCE);
         let (ours, law) = bench.time(*runs, || Ok(SectionLaw::of_body(&body, &options)?))?;
         let peer = match &answer {

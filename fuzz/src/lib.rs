@@ -1,7 +1,8 @@
 //! What may be asked of any bytes: an error or a result, never a panic, a hang or a number that is none.
 //!
-//! `cargo fuzz run mesh_file` (nightly, cargo-fuzz) drives these functions with coverage; `cargo run --release --bin mutate -- SECONDS` drives them
-//! with random changes of small meshes, and needs neither.
+//! `cargo +nightly fuzz run mesh_file --features libfuzzer` (cargo-fuzz; `-s none` without sanitizers) drives these functions with coverage, from the
+//! small corpus beside; `cargo run --release --example mutate -- SECONDS` drives them with random changes of small meshes, and needs neither.
+//! `cargo run --release --example replay -- corpus/*/*` runs the corpus, former failures among it.
 
 use std::path::Path;
 

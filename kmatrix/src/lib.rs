@@ -40,8 +40,8 @@
 //! # Why not Monte Carlo
 //!
 //! The paper takes 100,000 random sections for 0.5 %. It is here as [`SectionLaw::monte_carlo`], by polygons or by the paper's own stencil
-//! buffer, and judges the sweep in the tests; the sweep reaches 0.01 % of 758 triangles in 0.6 s on one core. The paper also loses the number
-//! of profiles per hit of bodies that are not convex ([`Counting::Paper`]): 1.4 to 1.6 for a torus, and number densities come out as many
+//! buffer, and judges the sweep in the tests; the sweep reaches 0.01 % of 1,280 triangles in 0.5 s on one core. The paper also loses the number
+//! of profiles per hit of bodies that are not convex ([`Counting::Paper`]): 1.4 to 1.5 for a torus, and number densities come out as many
 //! times too large.
 
 mod contours;

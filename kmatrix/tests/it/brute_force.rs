@@ -80,5 +80,7 @@ fn encountered_maximum_is_low() {
         .with_iterations(10_000)
         .with_largest(LargestArea::Encountered);
     let met = SectionLaw::monte_carlo(&cube, &options).unwrap().max_area();
-    assert!(met < 2.0_f64.sqrt() && met > 0.95 * 2.0_f64.sqrt(), "{met}");
+    // Low by 1 to 3 %, as docs/kmatrix.md tells.
+    let low = 1.0 - met / 2.0_f64.sqrt();
+    assert!((0.01..0.03).contains(&low), "{low}");
 }

@@ -39,7 +39,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     removed?;
     let mut rows = Vec::new();
     for (k, (name, mesh, runs)) in meshes.iter().enumerate() {
-        let checks = runs.div_ceil(10);
+        let checks = u32::div_ceil(*runs, 10);
         let (checking, body) = bench.time(checks, || Ok(Body::from_mesh(ClosedMesh::try_from(mesh.clone())?)))?;
         let options = SectionOptions::default().with_bins(BINS).with_tolerance(TOLERANCE);
         let (ours, law) = bench.time(*runs, || Ok(SectionLaw::of_body(&body, &options)?))?;

@@ -1,6 +1,6 @@
 //! Factors of symmetric positive definite matrices, small and dense, without allocation between fits.
 
-/// A symmetric matrix of which the lower triangle is used, row by row; then its factor in the same place.
+/// A symmetric matrix of which one triangle is used; then its factor U, with UᵀU the matrix, in the same place, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct Symmetric {
     size: usize,
@@ -21,23 +21,30 @@ impl Symmetric {
 
     /// Entry (i, j), j ≤ i.
     pub(crate) fn entry(&mut self, i: usize, j: usize) -> &mut f64 {
-        &mut self.entries[i * self.size + j]
+        &mut self.entries[j * self.size + i]
     }
 
-    /// Replaces the matrix by L with L Lᵀ the matrix; `false` if it is not positive definite.
+    /// Replaces the matrix by U with Uᵀ U the matrix; `false` if it is not positive definite.
     pub(crate) fn factorise(&mut self) -> bool {
         let n = self.size;
-        for i in 0..n {
-            let (above, row) = self.entries.split_at_mut(i * n);
-            for j in 0..i {
-                let other = &above[j * n..=j * n + j];
-                row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
-            }
-            let left = row[i] - dot(&row[..i], &row[..i]);
-            if left.is_nan() || left <= 0.0 {
+        for k in 0..n {
+            let (done, below) = self.entries.split_at_mut((k + 1) * n);
+            let row = &mut done[k * n + k..];
+            let pivot = row[0];
+            if pivot.is_nan() || pivot <= 0.0 {
                 return false;
             }
-            row[i] = left.sqrt();
+            let root = pivot.sqrt();
+            let scale = 1.0 / root;
+            row[0] = root;
+            row[1..].iter_mut().for_each(|u| *u *= scale);
+            let row = &row[1..];
+            for (i, factor) in row.iter().enumerate() {
+                let other = &mut below[i * n + k + 1 + i..(i + 1) * n];
+                for (other, u) in other.iter_mut().zip(&row[i..]) {
+                    *other -= factor * u;
+                }
+            }
         }
         true
     }
@@ -51,16 +58,16 @@ impl Symmetric {
     pub(crate) fn solve(&self, x: &mut [f64]) {
         let n = self.size;
         for i in 0..n {
-            let row = &self.entries[i * n..=i * n + i];
-            x[i] = (x[i] - dot(&row[..i], &x[..i])) / row[i];
+            let row = &self.entries[i * n + i..(i + 1) * n];
+            x[i] /= row[0];
+            let value = x[i];
+            for (right, u) in x[i + 1..].iter_mut().zip(&row[1..]) {
+                *right -= u * value;
+            }
         }
         for i in (0..n).rev() {
-            let row = &self.entries[i * n..=i * n + i];
-            x[i] /= row[i];
-            let value = x[i];
-            for (left, l) in x[..i].iter_mut().zip(row) {
-                *left -= l * value;
-            }
+            let row = &self.entries[i * n + i..(i + 1) * n];
+            x[i] = (x[i] - dot(&row[1..], &x[i + 1..])) / row[0];
         }
     }
 }
@@ -77,6 +84,26 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// [`dot`] of `a` and each of four others, all as long as `a`, side by side: every number of `a` is read once.
+pub(crate) fn dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
+    let mut sums = [[0.0; 2]; 4];
+    let twos = others.map(|other| other.chunks_exact(2));
+    let [first, second, third, fourth] = twos;
+    let together = a.chunks_exact(2).zip(first).zip(second.zip(third.zip(fourth)));
+    for ((a, first), (second, (third, fourth))) in together {
+        for k in 0..2 {
+            sums[0][k] += a[k] * first[k];
+            sums[1][k] += a[k] * second[k];
+            sums[2][k] += a[k] * third[k];
+            sums[3][k] += a[k] * fourth[k];
+        }
+    }
+    let odd = a.len() % 2;
+    let last = a.len() - odd;
+    let rest = others.map(|other| if odd == 1 { a[last] * other[last] } else { 0.0 });
+    [0, 1, 2, 3].map(|k| sums[k][0] + sums[k][1] + rest[k])
 }
 
 #[cfg(test)]

@@ -72,7 +72,8 @@ pub(crate) fn again(
 ) -> Result<Vec<f64>, UnfoldError> {
     match refit {
         Refit::Smooth(penalty, start) => {
-            let peak = climb(&problem.design, counts, *penalty, start, Effort::BRIEF, room);
+            let roughness = penalty.on(start.len());
+            let peak = climb(&problem.design, counts, &roughness, start, Effort::BRIEF, room);
             Ok(problem.with_logarithms(&peak.theta))
         }
         Refit::Likelihood => Ok(problem.spread(&sparse::on_all(&problem.coarse, counts))),

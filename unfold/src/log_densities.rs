@@ -1,6 +1,6 @@
 //! Fisher scoring for logarithms of densities: the likelihood of the counts, less a penalty on their roughness.
 
-use crate::cholesky::{Symmetric, dot};
+use crate::cholesky::{Symmetric, dot, dots};
 use nalgebra::DMatrix;
 
 /// Expected counts of one particle per unit volume in each node, column by column, with the rows each column touches.
@@ -67,11 +67,22 @@ pub(crate) fn log_likelihood(counts: &[f64], expected: &[f64]) -> f64 {
 pub(crate) struct Penalty {
     pub(crate) order: usize,
     pub(crate) weight: f64,
+    /// Where the penalty gives way, as a share of the nodes.
+    pub(crate) bend: Option<f64>,
 }
+
+/// At a bend the weight is 10³ times less.
+const BEND_DEPTH: f64 = 3.0;
+/// And returns to what it is elsewhere as a Gaussian with this standard deviation, a share of the nodes.
+const BEND_WIDTH: f64 = 0.12;
 
 impl Penalty {
     /// Nothing is penalised.
-    pub(crate) const NONE: Self = Self { order: 0, weight: 0.0 };
+    pub(crate) const NONE: Self = Self {
+        order: 0,
+        weight: 0.0,
+        bend: None,
+    };
 
     /// Coefficients of one difference: (−1)^(r − k) C(r, k).
     fn stencil(order: usize) -> Vec<f64> {
@@ -85,40 +96,22 @@ impl Penalty {
         })
     }
 
-    /// Half the penalty of θ, and its slope taken off `slope`.
-    fn apply(self, theta: &[f64], slope: Option<&mut [f64]>) -> f64 {
-        if self.weight <= 0.0 {
-            return 0.0;
-        }
-        let stencil = Self::stencil(self.order);
-        let differences = theta
-            .windows(self.order + 1)
-            .map(|part| part.iter().zip(&stencil).map(|(t, w)| t * w).sum::<f64>());
-        let Some(slope) = slope else {
-            return 0.5 * self.weight * differences.map(|d| d * d).sum::<f64>();
+    /// The penalty of so many nodes.
+    pub(crate) fn on(self, nodes: usize) -> Roughness {
+        let weight = |difference: usize| {
+            let Some(bend) = self.bend else { return self.weight };
+            let middle = (difference as f64 + 0.5 * (self.order as f64 + 1.0)) / nodes as f64;
+            let apart = (middle - bend) / BEND_WIDTH;
+            self.weight * 10_f64.powf(-BEND_DEPTH * (-0.5 * apart * apart).exp())
         };
-        let mut half = 0.0;
-        for (start, difference) in differences.enumerate() {
-            half += 0.5 * self.weight * difference * difference;
-            for (s, w) in slope[start..].iter_mut().zip(&stencil) {
-                *s -= self.weight * difference * w;
-            }
-        }
-        half
-    }
-
-    /// Adds the penalty's matrix.
-    pub(crate) fn add_to(self, matrix: &mut Symmetric) {
-        if self.weight <= 0.0 {
-            return;
-        }
-        let stencil = Self::stencil(self.order);
-        for start in 0..matrix.size().saturating_sub(self.order) {
-            for (a, wa) in stencil.iter().enumerate() {
-                for (b, wb) in stencil[..=a].iter().enumerate() {
-                    *matrix.entry(start + a, start + b) += self.weight * wa * wb;
-                }
-            }
+        let differences = if self.weight > 0.0 {
+            nodes.saturating_sub(self.order)
+        } else {
+            0
+        };
+        Roughness {
+            stencil: Self::stencil(self.order),
+            weights: (0..differences).map(weight).collect(),
         }
     }
 
@@ -136,21 +129,73 @@ impl Penalty {
     }
 }
 
+/// A penalty on the nodes of a fit: the weight of every difference.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Roughness {
+    stencil: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Roughness {
+    /// Half the penalty of θ.
+    fn half(&self, theta: &[f64]) -> f64 {
+        let differences = theta.windows(self.stencil.len()).zip(&self.weights);
+        let half = |(part, weight): (&[f64], &f64)| {
+            let difference: f64 = part.iter().zip(&self.stencil).map(|(t, w)| t * w).sum();
+            0.5 * weight * difference * difference
+        };
+        differences.map(half).sum()
+    }
+
+    /// Takes the slope of half the penalty off `slope`.
+    fn take_off(&self, theta: &[f64], slope: &mut [f64]) {
+        for (start, (part, weight)) in theta.windows(self.stencil.len()).zip(&self.weights).enumerate() {
+            let difference: f64 = part.iter().zip(&self.stencil).map(|(t, w)| t * w).sum();
+            for (s, w) in slope[start..].iter_mut().zip(&self.stencil) {
+                *s -= weight * difference * w;
+            }
+        }
+    }
+
+    /// Adds the penalty's matrix.
+    pub(crate) fn add_to(&self, matrix: &mut Symmetric) {
+        for (start, weight) in self.weights.iter().enumerate() {
+            for (a, wa) in self.stencil.iter().enumerate() {
+                for (b, wb) in self.stencil[..=a].iter().enumerate() {
+                    *matrix.entry(start + a, start + b) += weight * wa * wb;
+                }
+            }
+        }
+    }
+
+    /// Σ ln of the weights.
+    pub(crate) fn log_weights(&self) -> f64 {
+        self.weights.iter().map(|weight| weight.ln()).sum()
+    }
+}
+
 /// What scoring works on, kept between fits.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     expected: Vec<f64>,
     densities: Vec<f64>,
+    /// K diag(n) / √μ, column by column, each from row 0 on and padded to whole fours with zeros.
     scaled: Vec<f64>,
+    stride: usize,
+    /// 1 / √μ and n / μ − 1.
+    roots: Vec<(f64, f64)>,
     pub(crate) information: Symmetric,
 }
 
 impl Workspace {
     pub(crate) fn new(design: &Design) -> Self {
+        let stride = design.rows.next_multiple_of(4);
         Self {
             expected: vec![0.0; design.rows],
             densities: vec![0.0; design.nodes()],
-            scaled: vec![0.0; design.rows * design.nodes()],
+            scaled: vec![0.0; stride * design.nodes()],
+            stride,
+            roots: vec![(0.0, 0.0); design.rows],
             information: Symmetric::zeros(design.nodes()),
         }
     }
@@ -190,7 +235,7 @@ const LONGEST_STEP: f64 = 3.0;
 pub(crate) fn climb(
     design: &Design,
     counts: &[f64],
-    penalty: Penalty,
+    penalty: &Roughness,
     start: &[f64],
     effort: Effort,
     room: &mut Workspace,
@@ -269,39 +314,44 @@ impl Effort {
 }
 
 /// Log-likelihood and penalised log-likelihood at θ, with densities and expected counts left in `room`.
-fn ascend(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> (f64, f64) {
+fn ascend(design: &Design, counts: &[f64], penalty: &Roughness, theta: &[f64], room: &mut Workspace) -> (f64, f64) {
     for (density, t) in room.densities.iter_mut().zip(theta) {
         *density = t.exp();
     }
     design.refold(&room.densities, &mut room.expected);
     let likelihood = log_likelihood(counts, &room.expected);
-    (likelihood, likelihood - penalty.apply(theta, None))
+    (likelihood, likelihood - penalty.half(theta))
 }
 
 /// Slope of the penalised likelihood into `slope`, information into `room`.
-fn score(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], slope: &mut [f64], room: &mut Workspace) {
+fn score(
+    design: &Design,
+    counts: &[f64],
+    penalty: &Roughness,
+    theta: &[f64],
+    slope: &mut [f64],
+    room: &mut Workspace,
+) {
     let Workspace {
         expected,
         densities,
         scaled,
+        stride,
+        roots,
         information,
     } = room;
-    let rows = design.rows;
     // 1/√μ for the information, n/μ − 1 for the slope.
-    let roots: Vec<(f64, f64)> = expected
-        .iter()
-        .zip(counts)
-        .map(|(&mu, &n)| {
-            if mu > 0.0 {
-                (1.0 / mu.sqrt(), n / mu - 1.0)
-            } else {
-                (0.0, 0.0)
-            }
-        })
-        .collect();
+    for ((root, &mu), &n) in roots.iter_mut().zip(&*expected).zip(counts) {
+        *root = if mu > 0.0 {
+            (1.0 / mu.sqrt(), n / mu - 1.0)
+        } else {
+            (0.0, 0.0)
+        };
+    }
     for (node, slope) in slope.iter_mut().enumerate() {
         let (from, column) = design.column(node);
-        let scaled = &mut scaled[node * rows + from..node * rows + from + column.len()];
+        let start = node * *stride + from;
+        let scaled = &mut scaled[start..start + column.len()];
         let mut sum = 0.0;
         for ((scaled, k), (root, excess)) in scaled.iter_mut().zip(column).zip(&roots[from..]) {
             let weight = k * densities[node];
@@ -310,19 +360,33 @@ fn score(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], slope
         }
         *slope = sum;
     }
+    let padded = |(from, to): (usize, usize)| (from / 4 * 4, to.next_multiple_of(4));
+    let of = |node: usize, (from, to): (usize, usize)| &scaled[node * *stride + from..node * *stride + to];
     for i in 0..design.nodes() {
-        let (from_i, to_i) = design.spans[i];
-        for j in 0..=i {
-            let (from_j, to_j) = design.spans[j];
-            let from = from_i.max(from_j);
-            let to = to_i.min(to_j).max(from);
-            *information.entry(i, j) = dot(
-                &scaled[i * rows + from..i * rows + to],
-                &scaled[j * rows + from..j * rows + to],
-            );
+        let whole = padded(design.spans[i]);
+        let shared = |j: usize| {
+            let (from, to) = padded(design.spans[j]);
+            let from = from.max(whole.0);
+            (from, to.min(whole.1).max(from))
+        };
+        let mut j = 0;
+        // Four at a time; what a column does not reach is zero.
+        while j + 4 <= i + 1 {
+            let spans = [j, j + 1, j + 2, j + 3].map(shared);
+            let from = spans.iter().map(|span| span.0).min().unwrap_or(0);
+            let to = spans.iter().map(|span| span.1).max().unwrap_or(0).max(from);
+            let others = [j, j + 1, j + 2, j + 3].map(|j| of(j, (from, to)));
+            for (k, sum) in dots(of(i, (from, to)), others).into_iter().enumerate() {
+                *information.entry(i, j + k) = sum;
+            }
+            j += 4;
+        }
+        for j in j..=i {
+            let span = shared(j);
+            *information.entry(i, j) = dot(of(i, span), of(j, span));
         }
         *information.entry(i, i) += RIDGE;
     }
-    penalty.apply(theta, Some(slope));
+    penalty.take_off(theta, slope);
     penalty.add_to(information);
 }

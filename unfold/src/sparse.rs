@@ -30,7 +30,7 @@ pub(crate) fn choose(matrix: &DMatrix<f64>, counts: &[f64]) -> SparseFit {
         let design = Design::new(&matrix.select_columns(&kept));
         let mut room = Workspace::new(&design);
         let from = start.unwrap_or_else(|| vec![level(&design, counts).ln(); kept.len()]);
-        let peak = climb(&design, counts, Penalty::NONE, &from, Effort::FULL, &mut room);
+        let peak = climb(&design, counts, &Penalty::NONE.on(0), &from, Effort::FULL, &mut room);
         iterations += peak.iterations;
         let evidence = peak.likelihood - price * kept.len() as f64;
         if best.as_ref().is_none_or(|best| evidence > best.evidence) {
@@ -54,7 +54,7 @@ pub(crate) fn on_all(matrix: &DMatrix<f64>, counts: &[f64]) -> Vec<f64> {
     let design = Design::new(matrix);
     let mut room = Workspace::new(&design);
     let start = vec![level(&design, counts).ln(); matrix.ncols()];
-    let peak = climb(&design, counts, Penalty::NONE, &start, Effort::FULL, &mut room);
+    let peak = climb(&design, counts, &Penalty::NONE.on(0), &start, Effort::FULL, &mut room);
     peak.theta.iter().map(|t| t.exp()).collect()
 }
 

@@ -1,5 +1,8 @@
 //! Factors of symmetric positive definite matrices, small and dense, without allocation between fits.
 
+/// Rows of a factor that are finished together.
+const PANEL: usize = 4;
+
 /// A symmetric matrix of which one triangle is used; then its factor U, with UᵀU the matrix, in the same place, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct Symmetric {
@@ -25,26 +28,41 @@ impl Symmetric {
     }
 
     /// Replaces the matrix by U with Uᵀ U the matrix; `false` if it is not positive definite.
+    ///
+    /// Four rows are finished at a time and taken off those below together: rows are short, so what counts is how often each is read.
     pub(crate) fn factorise(&mut self) -> bool {
         let n = self.size;
-        for k in 0..n {
-            let (done, below) = self.entries.split_at_mut((k + 1) * n);
-            let row = &mut done[k * n + k..];
-            let pivot = row[0];
-            if pivot.is_nan() || pivot <= 0.0 {
-                return false;
+        let mut first = 0;
+        while first < n {
+            let height = (n - first).min(PANEL);
+            for k in first..first + height {
+                let (above, rest) = self.entries.split_at_mut(k * n);
+                let row = &mut rest[k..n];
+                for done in above[first * n..].chunks_exact(n) {
+                    let factor = done[k];
+                    row.iter_mut().zip(&done[k..]).for_each(|(x, u)| *x -= factor * u);
+                }
+                let pivot = row[0];
+                if pivot.is_nan() || pivot <= 0.0 {
+                    return false;
+                }
+                let root = pivot.sqrt();
+                let scale = 1.0 / root;
+                row[0] = root;
+                row[1..].iter_mut().for_each(|u| *u *= scale);
             }
-            let root = pivot.sqrt();
-            let scale = 1.0 / root;
-            row[0] = root;
-            row[1..].iter_mut().for_each(|u| *u *= scale);
-            let row = &row[1..];
-            for (i, factor) in row.iter().enumerate() {
-                let other = &mut below[i * n + k + 1 + i..(i + 1) * n];
-                for (other, u) in other.iter_mut().zip(&row[i..]) {
-                    *other -= factor * u;
+            let (done, below) = self.entries.split_at_mut((first + height) * n);
+            // Fewer than four rows are left only at the end, where nothing is below them.
+            if let [a, b, c, d] = done[first * n..].chunks_exact(n).collect::<Vec<_>>()[..] {
+                for (i, row) in (first + height..).zip(below.chunks_exact_mut(n)) {
+                    let (fa, fb, fc, fd) = (a[i], b[i], c[i], d[i]);
+                    let four = a[i..].iter().zip(&b[i..]).zip(c[i..].iter().zip(&d[i..]));
+                    for (x, ((a, b), (c, d))) in row[i..].iter_mut().zip(four) {
+                        *x -= (fa * a + fb * b) + (fc * c + fd * d);
+                    }
                 }
             }
+            first += height;
         }
         true
     }
@@ -86,24 +104,20 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// [`dot`] of `a` and each of four others, all as long as `a`, side by side: every number of `a` is read once.
-pub(crate) fn dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
-    let mut sums = [[0.0; 2]; 4];
-    let twos = others.map(|other| other.chunks_exact(2));
-    let [first, second, third, fourth] = twos;
-    let together = a.chunks_exact(2).zip(first).zip(second.zip(third.zip(fourth)));
-    for ((a, first), (second, (third, fourth))) in together {
-        for k in 0..2 {
-            sums[0][k] += a[k] * first[k];
-            sums[1][k] += a[k] * second[k];
-            sums[2][k] += a[k] * third[k];
-            sums[3][k] += a[k] * fourth[k];
+/// Four columns of a matrix side by side, row by row.
+pub(crate) type Fours = [[f64; 4]];
+
+/// Products of four columns with four others: entry (p, q) is that of column p of `a` and column q of `b`.
+pub(crate) fn products(a: &Fours, b: &Fours) -> [[f64; 4]; 4] {
+    let mut sums = [[0.0; 4]; 4];
+    for (a, b) in a.iter().zip(b) {
+        for p in 0..4 {
+            for q in 0..4 {
+                sums[p][q] += a[p] * b[q];
+            }
         }
     }
-    let odd = a.len() % 2;
-    let last = a.len() - odd;
-    let rest = others.map(|other| if odd == 1 { a[last] * other[last] } else { 0.0 });
-    [0, 1, 2, 3].map(|k| sums[k][0] + sums[k][1] + rest[k])
+    sums
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Which estimator answers, how `auto` chooses, and what is fitted again for the intervals.
 
 use crate::expectation_maximisation::maximise;
-use crate::log_densities::{Effort, Penalty, Workspace, climb};
+use crate::log_densities::{Effort, Penalty, Start, Workspace, climb};
 use crate::penalised::smooth;
 use crate::problem::Problem;
 use crate::{Method, UnfoldError, UnfoldOptions, inverse, nnls, sparse};
@@ -73,7 +73,8 @@ pub(crate) fn again(
     match refit {
         Refit::Smooth(penalty, start) => {
             let roughness = penalty.on(start.len());
-            let peak = climb(&problem.design, counts, &roughness, start, Effort::BRIEF, room);
+            let start = Start::at(&problem.design, counts, start, room);
+            let peak = climb(&problem.design, counts, &roughness, &start, Effort::BRIEF, room);
             Ok(problem.with_logarithms(&peak.theta))
         }
         Refit::Likelihood => Ok(problem.spread(&sparse::on_all(&problem.coarse, counts))),

@@ -1,6 +1,6 @@
 //! Fisher scoring for logarithms of densities: the likelihood of the counts, less a penalty on their roughness.
 
-use crate::cholesky::{Symmetric, dot, dots};
+use crate::cholesky::{Symmetric, dot, products};
 use nalgebra::DMatrix;
 
 /// Expected counts of one particle per unit volume in each node, column by column, with the rows each column touches.
@@ -10,11 +10,15 @@ pub(crate) struct Design {
     entries: Vec<f64>,
     /// Rows of each column that are not zero: from, to.
     spans: Vec<(usize, usize)>,
+    /// The columns again, four side by side, the last filled up with zeros.
+    fours: Vec<[f64; 4]>,
+    /// Rows of each four that are not zero.
+    four_spans: Vec<(usize, usize)>,
 }
 
 impl Design {
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
-        let spans = matrix
+        let spans: Vec<(usize, usize)> = matrix
             .column_iter()
             .map(|column| {
                 let seen = |k: &f64| *k > 0.0;
@@ -22,9 +26,23 @@ impl Design {
                 (from, column.iter().rposition(seen).map_or(from, |last| last + 1))
             })
             .collect();
+        let (rows, columns) = matrix.shape();
+        let of = |row: usize, column: usize| if column < columns { matrix[(row, column)] } else { 0.0 };
+        let fours = (0..columns.div_ceil(4)).flat_map(|four| {
+            let side_by_side = move |row: usize| [0, 1, 2, 3].map(|k| of(row, 4 * four + k));
+            (0..rows).map(side_by_side)
+        });
         Self {
-            rows: matrix.nrows(),
+            rows,
             entries: matrix.as_slice().to_vec(),
+            fours: fours.collect(),
+            four_spans: spans
+                .chunks(4)
+                .map(|of| {
+                    let from = of.iter().map(|span| span.0).min().unwrap_or(0);
+                    (from, of.iter().map(|span| span.1).max().unwrap_or(0).max(from))
+                })
+                .collect(),
             spans,
         }
     }
@@ -179,9 +197,8 @@ impl Roughness {
 pub(crate) struct Workspace {
     expected: Vec<f64>,
     densities: Vec<f64>,
-    /// K diag(n) / √μ, column by column, each from row 0 on and padded to whole fours with zeros.
-    scaled: Vec<f64>,
-    stride: usize,
+    /// diag(1 / √μ) K diag(n), four columns side by side.
+    scaled: Vec<[f64; 4]>,
     /// 1 / √μ and n / μ − 1.
     roots: Vec<(f64, f64)>,
     pub(crate) information: Symmetric,
@@ -189,12 +206,10 @@ pub(crate) struct Workspace {
 
 impl Workspace {
     pub(crate) fn new(design: &Design) -> Self {
-        let stride = design.rows.next_multiple_of(4);
         Self {
             expected: vec![0.0; design.rows],
             densities: vec![0.0; design.nodes()],
-            scaled: vec![0.0; stride * design.nodes()],
-            stride,
+            scaled: vec![[0.0; 4]; design.fours.len()],
             roots: vec![(0.0, 0.0); design.rows],
             information: Symmetric::zeros(design.nodes()),
         }
@@ -223,6 +238,31 @@ const RIDGE: f64 = 1e-6;
 /// No logarithm moves farther than this in a step.
 const LONGEST_STEP: f64 = 3.0;
 
+/// Where a climb begins, and what is known there whatever the penalty: fits that begin at one place share it.
+#[derive(Clone, Debug)]
+pub(crate) struct Start {
+    theta: Vec<f64>,
+    likelihood: f64,
+    /// Of the likelihood.
+    slope: Vec<f64>,
+    /// Without a penalty.
+    information: Symmetric,
+}
+
+impl Start {
+    pub(crate) fn at(design: &Design, counts: &[f64], theta: &[f64], room: &mut Workspace) -> Self {
+        let likelihood = ascend(design, counts, theta, room);
+        let mut slope = vec![0.0; theta.len()];
+        score(design, counts, &mut slope, room);
+        Self {
+            theta: theta.to_vec(),
+            likelihood,
+            slope,
+            information: room.information.clone(),
+        }
+    }
+}
+
 /// Maximises ℓ(θ) − penalty / 2, ℓ = Σ n ln μ − μ, μ = K exp θ, by Fisher scoring with step halving.
 ///
 /// # Formula
@@ -236,25 +276,33 @@ pub(crate) fn climb(
     design: &Design,
     counts: &[f64],
     penalty: &Roughness,
-    start: &[f64],
+    start: &Start,
     effort: Effort,
     room: &mut Workspace,
 ) -> Peak {
-    let mut theta = start.to_vec();
+    let mut theta = start.theta.clone();
+    let mut slope = start.slope.clone();
+    room.information.clone_from(&start.information);
     let mut step = vec![0.0; theta.len()];
     let mut trial = theta.clone();
-    let (mut likelihood, mut value) = ascend(design, counts, penalty, &theta, room);
+    let mut likelihood = start.likelihood;
+    let mut value = likelihood - penalty.half(&theta);
     let (mut iterations, mut log_determinant, mut converged) = (0, 0.0, false);
     while iterations < effort.most_steps && !converged {
+        if iterations > 0 {
+            // Densities and expected counts of the last trial, which is where θ is, are in the room.
+            score(design, counts, &mut slope, room);
+        }
         iterations += 1;
-        score(design, counts, penalty, &theta, &mut step, room);
+        penalty.take_off(&theta, &mut slope);
+        penalty.add_to(&mut room.information);
         if !room.information.factorise() {
             break;
         }
         log_determinant = room.information.log_determinant();
-        trial.copy_from_slice(&step);
+        step.copy_from_slice(&slope);
         room.information.solve(&mut step);
-        let gain = dot(&trial, &step);
+        let gain = dot(&slope, &step);
         converged = gain < effort.last_gain;
         let longest = step.iter().fold(0.0_f64, |longest, s| longest.max(s.abs()));
         let mut length = (LONGEST_STEP / longest).min(1.0);
@@ -263,7 +311,8 @@ pub(crate) fn climb(
                 *trial = t + length * s;
             }
             length *= 0.5;
-            let (trial_likelihood, trial_value) = ascend(design, counts, penalty, &trial, room);
+            let trial_likelihood = ascend(design, counts, &trial, room);
+            let trial_value = trial_likelihood - penalty.half(&trial);
             let risen = trial_value >= value;
             if risen {
                 (likelihood, value) = (trial_likelihood, trial_value);
@@ -276,6 +325,10 @@ pub(crate) fn climb(
             break;
         }
         theta.copy_from_slice(&trial);
+        // What is left is half of what the step promised at most.
+        if value + gain - 0.5 * log_determinant < effort.hopeless {
+            break;
+        }
     }
     Peak {
         theta,
@@ -293,6 +346,8 @@ pub(crate) struct Effort {
     /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so what is left is far less.
     last_gain: f64,
     most_steps: usize,
+    /// A climb is given up where its value less half the logarithm of the determinant cannot come up to this.
+    hopeless: f64,
 }
 
 impl Effort {
@@ -300,46 +355,47 @@ impl Effort {
     pub(crate) const FULL: Self = Self {
         last_gain: 0.1,
         most_steps: 60,
+        hopeless: f64::NEG_INFINITY,
     };
     /// As near as evidence and refits need: densities that run towards zero are left on their way.
     pub(crate) const BRIEF: Self = Self {
         last_gain: 1.0,
         most_steps: 8,
+        hopeless: f64::NEG_INFINITY,
     };
     /// One step, for the information at the start.
     pub(crate) const STEP: Self = Self {
         last_gain: f64::INFINITY,
         most_steps: 1,
+        hopeless: f64::NEG_INFINITY,
     };
+
+    /// Given up where it cannot come up to `hopeless`.
+    pub(crate) const fn unless_below(mut self, hopeless: f64) -> Self {
+        self.hopeless = hopeless;
+        self
+    }
 }
 
-/// Log-likelihood and penalised log-likelihood at θ, with densities and expected counts left in `room`.
-fn ascend(design: &Design, counts: &[f64], penalty: &Roughness, theta: &[f64], room: &mut Workspace) -> (f64, f64) {
+/// Log-likelihood at θ, with densities and expected counts left in `room`.
+fn ascend(design: &Design, counts: &[f64], theta: &[f64], room: &mut Workspace) -> f64 {
     for (density, t) in room.densities.iter_mut().zip(theta) {
         *density = t.exp();
     }
     design.refold(&room.densities, &mut room.expected);
-    let likelihood = log_likelihood(counts, &room.expected);
-    (likelihood, likelihood - penalty.half(theta))
+    log_likelihood(counts, &room.expected)
 }
 
-/// Slope of the penalised likelihood into `slope`, information into `room`.
-fn score(
-    design: &Design,
-    counts: &[f64],
-    penalty: &Roughness,
-    theta: &[f64],
-    slope: &mut [f64],
-    room: &mut Workspace,
-) {
+/// Slope of the likelihood into `slope`, information into `room`, where its densities and expected counts are.
+fn score(design: &Design, counts: &[f64], slope: &mut [f64], room: &mut Workspace) {
     let Workspace {
         expected,
         densities,
         scaled,
-        stride,
         roots,
         information,
     } = room;
+    let (rows, nodes) = (design.rows, design.nodes());
     // 1/√μ for the information, n/μ − 1 for the slope.
     for ((root, &mu), &n) in roots.iter_mut().zip(&*expected).zip(counts) {
         *root = if mu > 0.0 {
@@ -348,45 +404,42 @@ fn score(
             (0.0, 0.0)
         };
     }
-    for (node, slope) in slope.iter_mut().enumerate() {
-        let (from, column) = design.column(node);
-        let start = node * *stride + from;
-        let scaled = &mut scaled[start..start + column.len()];
-        let mut sum = 0.0;
-        for ((scaled, k), (root, excess)) in scaled.iter_mut().zip(column).zip(&roots[from..]) {
-            let weight = k * densities[node];
-            *scaled = weight * root;
-            sum += weight * excess;
-        }
-        *slope = sum;
-    }
-    let padded = |(from, to): (usize, usize)| (from / 4 * 4, to.next_multiple_of(4));
-    let of = |node: usize, (from, to): (usize, usize)| &scaled[node * *stride + from..node * *stride + to];
-    for i in 0..design.nodes() {
-        let whole = padded(design.spans[i]);
-        let shared = |j: usize| {
-            let (from, to) = padded(design.spans[j]);
-            let from = from.max(whole.0);
-            (from, to.min(whole.1).max(from))
-        };
-        let mut j = 0;
-        // Four at a time; what a column does not reach is zero.
-        while j + 4 <= i + 1 {
-            let spans = [j, j + 1, j + 2, j + 3].map(shared);
-            let from = spans.iter().map(|span| span.0).min().unwrap_or(0);
-            let to = spans.iter().map(|span| span.1).max().unwrap_or(0).max(from);
-            let others = [j, j + 1, j + 2, j + 3].map(|j| of(j, (from, to)));
-            for (k, sum) in dots(of(i, (from, to)), others).into_iter().enumerate() {
-                *information.entry(i, j + k) = sum;
+    for (four, &(from, to)) in design.four_spans.iter().enumerate() {
+        let here = rows * four + from..rows * four + to;
+        let first = 4 * four;
+        let density = [0, 1, 2, 3].map(|k| densities.get(first + k).copied().unwrap_or(0.0));
+        let mut sums = [0.0; 4];
+        for ((scaled, kernel), (root, excess)) in
+            scaled[here.clone()].iter_mut().zip(&design.fours[here]).zip(&roots[from..to])
+        {
+            for k in 0..4 {
+                let weight = kernel[k] * density[k];
+                scaled[k] = weight * root;
+                sums[k] += weight * excess;
             }
-            j += 4;
         }
-        for j in j..=i {
-            let span = shared(j);
-            *information.entry(i, j) = dot(of(i, span), of(j, span));
+        slope[first..nodes.min(first + 4)]
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(slope, sum)| *slope = sum);
+    }
+    for (four, &(from_i, to_i)) in design.four_spans.iter().enumerate() {
+        for (other, &(from_j, to_j)) in design.four_spans[..=four].iter().enumerate() {
+            let from = from_i.max(from_j);
+            let to = to_i.min(to_j).max(from);
+            let of = |four: usize| &scaled[rows * four + from..rows * four + to];
+            let block = products(of(other), of(four));
+            for (p, row) in block.iter().enumerate() {
+                for (q, value) in row.iter().enumerate() {
+                    let (j, i) = (4 * other + p, 4 * four + q);
+                    if j <= i && i < nodes {
+                        *information.entry(i, j) = *value;
+                    }
+                }
+            }
         }
+    }
+    for i in 0..nodes {
         *information.entry(i, i) += RIDGE;
     }
-    penalty.take_off(theta, slope);
-    penalty.add_to(information);
 }

@@ -4,7 +4,7 @@
 //! criterion, and odds of two to one against every bin. Bins are given up one by one, the least significant first by Wald's statistic, and the best
 //! of the nested sets is taken. Its log-likelihood less the prices stands for its evidence.
 
-use crate::log_densities::{Design, Effort, Peak, Penalty, Workspace, climb};
+use crate::log_densities::{Design, Effort, Peak, Penalty, Start, Workspace, climb};
 use crate::penalised::level;
 use nalgebra::DMatrix;
 
@@ -30,7 +30,8 @@ pub(crate) fn choose(matrix: &DMatrix<f64>, counts: &[f64]) -> SparseFit {
         let design = Design::new(&matrix.select_columns(&kept));
         let mut room = Workspace::new(&design);
         let from = start.unwrap_or_else(|| vec![level(&design, counts).ln(); kept.len()]);
-        let peak = climb(&design, counts, &Penalty::NONE.on(0), &from, Effort::FULL, &mut room);
+        let begin = Start::at(&design, counts, &from, &mut room);
+        let peak = climb(&design, counts, &Penalty::NONE.on(0), &begin, Effort::FULL, &mut room);
         iterations += peak.iterations;
         let evidence = peak.likelihood - price * kept.len() as f64;
         if best.as_ref().is_none_or(|best| evidence > best.evidence) {
@@ -54,6 +55,7 @@ pub(crate) fn on_all(matrix: &DMatrix<f64>, counts: &[f64]) -> Vec<f64> {
     let design = Design::new(matrix);
     let mut room = Workspace::new(&design);
     let start = vec![level(&design, counts).ln(); matrix.ncols()];
+    let start = Start::at(&design, counts, &start, &mut room);
     let peak = climb(&design, counts, &Penalty::NONE.on(0), &start, Effort::FULL, &mut room);
     peak.theta.iter().map(|t| t.exp()).collect()
 }

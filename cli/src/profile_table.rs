@@ -4,6 +4,8 @@ use std::fmt;
 use std::fs::File;
 use std::path::Path;
 
+use stereology::unfold::BoundingBox;
+
 /// A profile of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableProfile {
@@ -17,6 +19,10 @@ pub struct TableProfile {
     pub weight: f64,
     /// The slice it is on, if the table tells.
     pub slice: Option<usize>,
+    /// Whether it touches the edge of its slice, if the table tells.
+    pub touches_edge: Option<bool>,
+    /// Box around it, in a window that begins at (0, 0), if the table tells.
+    pub bounding_box: Option<BoundingBox>,
 }
 
 /// Why a table of profiles cannot be read.
@@ -79,6 +85,11 @@ pub fn read_profiles(path: &Path) -> Result<Vec<TableProfile>, TableError> {
     };
     let (size, area) = (column("size"), column("area"));
     let (kind, category, weight, slice) = (column("type"), column("category"), column("weight"), column("slice"));
+    let touches_edge = column("touches_edge");
+    let sides = match ["left", "top", "right", "bottom"].map(column) {
+        [Some(left), Some(top), Some(right), Some(bottom)] => Some([left, top, right, bottom]),
+        _ => None,
+    };
     if size.or(area).is_none() {
         let found: Vec<_> = headers.iter().take(8).collect();
         return Err(TableError::NoSize {
@@ -133,6 +144,28 @@ pub fn read_profiles(path: &Path) -> Result<Vec<TableProfile>, TableError> {
                 })
                 .transpose()?,
             category: category.map(|column| index(column, "category")).transpose()?,
+            touches_edge: touches_edge
+                .map(|column| match text(column).to_ascii_lowercase().as_str() {
+                    "1" | "true" => Ok(true),
+                    "0" | "false" => Ok(false),
+                    other => Err(wrong(format!("`{other}` in column `touches_edge` is neither 0 nor 1"))),
+                })
+                .transpose()?,
+            bounding_box: sides
+                .map(|[left, top, right, bottom]| {
+                    let of = BoundingBox {
+                        left: number(left)?,
+                        top: number(top)?,
+                        right: number(right)?,
+                        bottom: number(bottom)?,
+                    };
+                    if of.left < of.right && of.top < of.bottom {
+                        Ok(of)
+                    } else {
+                        Err(wrong("left is not below right, or top not below bottom".to_owned()))
+                    }
+                })
+                .transpose()?,
             weight: match weight.map(number).transpose()? {
                 None => 1.0,
                 Some(weight) if weight >= 0.0 => weight,

@@ -111,6 +111,22 @@ impl FromStr for CappingAngle {
     }
 }
 
+/// Width and height of a slice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window(pub [f64; 2]);
+
+impl FromStr for Window {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides: Vec<f64> = text.split(',').map(positive).collect::<Result<_, _>>()?;
+        match sides[..] {
+            [width, height] => Ok(Self([width, height])),
+            _ => Err("two lengths are needed, width and height, such as 640,480".to_owned()),
+        }
+    }
+}
+
 /// A number of bins, from 1 to 1000.
 pub fn bins(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {

@@ -375,7 +375,7 @@ fn read_texture(path: &Path, voxel: f64) -> Result<Residual, FileError> {
 /// use stereology::files::write_densities;
 /// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
 ///
-/// let profiles = MeasuredProfiles { sizes: vec![3.0, 4.0, 5.0], weights: vec![1.0; 3], categories: vec![0; 3], slices: vec![], area: 100.0, min_size: 0.0 };
+/// let profiles = MeasuredProfiles { sizes: vec![3.0, 4.0, 5.0], weights: vec![1.0; 3], categories: vec![0; 3], area: 100.0, ..MeasuredProfiles::default() };
 /// let options = DensityOptions { bins: 2, ..DensityOptions::default() };
 /// let densities = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// let folder = tempfile::tempdir()?;

@@ -17,8 +17,8 @@ pub(crate) struct Fit {
     pub(crate) negative: Vec<(usize, f64)>,
     pub(crate) iterations: usize,
     pub(crate) converged: bool,
-    /// Order and weight of the best penalty.
-    pub(crate) penalty: Option<(usize, f64)>,
+    /// The best penalty.
+    pub(crate) penalty: Option<Penalty>,
     /// Parameters in effect.
     pub(crate) parameters: f64,
     /// ln evidence of the sparse estimate less that of the smooth one, where both were asked.
@@ -102,7 +102,7 @@ fn smooth_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
         negative: Vec::new(),
         iterations: found.iterations,
         converged: true,
-        penalty: Some((found.penalty.order, found.penalty.weight)),
+        penalty: Some(found.penalty),
         parameters: found.effective_parameters,
         for_sparse: None,
         again: Refit::Smooth(rougher, theta),

@@ -236,7 +236,7 @@ pub(crate) struct Peak {
 /// Keeps logarithms of densities that no count and no neighbour holds from running away: a standard deviation of 10³.
 const RIDGE: f64 = 1e-6;
 /// No logarithm moves farther than this in a step.
-const LONGEST_STEP: f64 = 3.0;
+const LONGEST_STEP: f64 = 12.0;
 
 /// Where a climb begins, and what is known there whatever the penalty: fits that begin at one place share it.
 #[derive(Clone, Debug)]
@@ -409,8 +409,10 @@ fn score(design: &Design, counts: &[f64], slope: &mut [f64], room: &mut Workspac
         let first = 4 * four;
         let density = [0, 1, 2, 3].map(|k| densities.get(first + k).copied().unwrap_or(0.0));
         let mut sums = [0.0; 4];
-        for ((scaled, kernel), (root, excess)) in
-            scaled[here.clone()].iter_mut().zip(&design.fours[here]).zip(&roots[from..to])
+        for ((scaled, kernel), (root, excess)) in scaled[here.clone()]
+            .iter_mut()
+            .zip(&design.fours[here])
+            .zip(&roots[from..to])
         {
             for k in 0..4 {
                 let weight = kernel[k] * density[k];

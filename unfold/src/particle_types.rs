@@ -34,6 +34,17 @@ pub struct TypesUnfolding {
     pub refolded: Vec<f64>,
 }
 
+impl TypesUnfolding {
+    /// Sums the profile bins of every type and of their sum to those between `edges`, as [`Unfolding::rebin_profiles`].
+    pub fn rebin_profiles(&mut self, edges: &[f64]) {
+        if let Some(first) = self.types.first() {
+            self.observed = first.profiles_in(edges, &self.observed);
+            self.refolded = first.profiles_in(edges, &self.refolded);
+        }
+        self.types.iter_mut().for_each(|of| of.rebin_profiles(edges));
+    }
+}
+
 /// Unfolds labelled profiles: counts and kernel of each type, on common edges.
 ///
 /// Where it is known which type each profile belongs to, eq. (9) falls apart into one system a type; their sum, its intervals and the sum of the

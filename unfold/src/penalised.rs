@@ -131,7 +131,11 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
     for factor in [DECADE, 1.0 / DECADE] {
         let mut last = 0;
         loop {
-            let Step { penalty, peak, evidence } = &steps[last];
+            let Step {
+                penalty,
+                peak,
+                evidence,
+            } = &steps[last];
             let weight = penalty.weight * factor;
             let lost = *evidence < steps[best].evidence - ENOUGH;
             if lost || weight > 1.001 * heaviest || steps.len() == MOST_WEIGHTS {

@@ -117,6 +117,14 @@ impl Problem {
             .collect()
     }
 
+    /// The size at a share of the kept bins, `edges` those of the kernel.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Between zero and the number of bins.
+    pub(crate) fn size_at(&self, edges: &[f64], share: f64) -> f64 {
+        let place = share * self.columns.len() as f64;
+        let bin = self.columns[(place as usize).min(self.columns.len() - 1)];
+        edges[bin] + place.fract() * (edges[bin + 1] - edges[bin])
+    }
+
     /// Expected counts.
     pub(crate) fn refold(&self, fine: &[f64]) -> Vec<f64> {
         let expected = &self.fine * DVector::from_column_slice(fine);

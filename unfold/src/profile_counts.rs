@@ -2,6 +2,9 @@
 
 use crate::size_bins::{EdgesError, check_edges};
 
+/// Slices numbered beyond this are numbered anew.
+const MOST_SLICES: usize = 1_000_000;
+
 /// Profiles counted in bins (a, b] of their size, on a known area.
 ///
 /// Bins are closed above: a profile exactly as large as the largest particle belongs to the last bin. The density of profiles is singular
@@ -210,7 +213,7 @@ impl ProfileCounts {
         let mut numbers: Vec<usize> = slices.to_vec();
         numbers.sort_unstable();
         numbers.dedup();
-        let dense = numbers.last().is_some_and(|&last| last < 1_000_000);
+        let dense = numbers.last().is_some_and(|&last| last < MOST_SLICES);
         let place = |slice: usize| {
             if dense {
                 slice
@@ -293,6 +296,26 @@ impl ProfileCounts {
     #[must_use]
     pub fn slices(&self) -> Option<usize> {
         self.slices.as_ref().map(Vec::len)
+    }
+
+    /// At least so many slices, those beyond what profiles told without any: for a part of the profiles that has none on the last slices.
+    ///
+    /// ```
+    /// use stereology_unfold::ProfileCounts;
+    /// let counts = ProfileCounts::from_slices(&[0.2, 0.9], None, &[0, 2], &[0.0, 0.5, 1.0], 5.0)?.with_slices(5);
+    /// assert_eq!(counts.slices(), Some(5));
+    /// # Ok::<(), stereology_unfold::ProfilesError>(())
+    /// ```
+    #[must_use]
+    pub fn with_slices(mut self, slices: usize) -> Self {
+        let bins = self.counts.len();
+        if let Some(by_slice) = &mut self.slices
+            && by_slice.len() < slices
+            && slices <= MOST_SLICES
+        {
+            by_slice.resize(slices, vec![0.0; bins]);
+        }
+        self
     }
 
     /// Counts of each slice.

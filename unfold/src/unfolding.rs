@@ -144,6 +144,8 @@ pub struct PenaltyUsed {
     pub order: usize,
     /// Its weight λ; depends on the number of bins of the kernel.
     pub weight: f64,
+    /// Size about which it gives way, if it does: the distribution may bend there more sharply than elsewhere.
+    pub bend: Option<f64>,
 }
 
 /// Particles per unit volume, by size, and everything needed to judge them.
@@ -433,7 +435,11 @@ fn result(
         threshold: problem.threshold,
         method: fit.method,
         evidence_for_sparse: fit.for_sparse,
-        penalty: fit.penalty.map(|(order, weight)| PenaltyUsed { order, weight }),
+        penalty: fit.penalty.map(|penalty| PenaltyUsed {
+            order: penalty.order,
+            weight: penalty.weight,
+            bend: penalty.bend.map(|share| problem.size_at(sizes.edges(), share)),
+        }),
         clamped_bins: fit.negative.iter().map(|&(k, _)| problem.reported[k]).collect(),
         iterations: fit.iterations,
         findings: findings(problem, counts, kernel, options, fit, &coarse),

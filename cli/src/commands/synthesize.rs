@@ -8,9 +8,7 @@ use serde_json::{Map, Value, json};
 use stereology::anneal::PackOptions;
 use stereology::files;
 use stereology::grid::Format;
-use stereology::pipeline::{
-    self, Comparison, DensityOptions, Extent, LargestSize, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions,
-};
+use stereology::pipeline::{self, Comparison, Extent, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions};
 use stereology::pyramid::TextureReport;
 use stereology::render::{BlockOptions, render_block};
 use stereology::sample;
@@ -20,14 +18,14 @@ use stereology::volume::{Channel, SlicePlane};
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::commands::pack::pack_failure;
-use crate::commands::unfold::{Choices as Unfolding, Spacing, types};
+use crate::commands::unfold::{Defaults, types};
 use crate::commands::{pack, segment, texture, unfold};
 use crate::failure::{Explain, Failure};
 use crate::numbers::{counted, percent, significant};
 use crate::outputs::{OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Stages, go_on};
 use crate::report::{self, Pictures, report_input};
-use crate::values::{BinCount, ShapeShare, count, positive, share};
+use crate::values::{ShapeShare, count, positive, share};
 
 /// From a photograph of a cut to the solid it came from, and a report that tells whether to trust it
 ///
@@ -87,10 +85,11 @@ pub struct Solid {
 
 /// More voxels along a side would take longer than the whole solid: a matter for `export`.
 const MOST_VOXELS: usize = 2048;
-/// Size bins if not given: ten leave steps in the profile sizes of the solid's sections.
-const BINS: usize = 16;
-/// Bootstrap replicates if not given: the report shows intervals.
-const REPLICATES: usize = 200;
+/// Ten bins leave steps in the profile sizes of the solid's sections; the report shows intervals.
+const DEFAULTS: Defaults = Defaults {
+    bins: 16,
+    replicates: Some(200),
+};
 /// White between photograph and section in comparison.png, in pixels.
 const GAP: u32 = 8;
 /// Normals of the sections that the report shows, and their offsets as fractions of the box's side: aslant, so that the solid's period does not show.
@@ -142,37 +141,10 @@ impl Synthesize {
 
     fn options(&self, everywhere: &Everywhere) -> Result<SynthesisOptions, Failure> {
         let seed = everywhere.seed;
-        let unfold = &self.unfold;
-        let edges = match (&unfold.edges, unfold.spacing) {
-            (None, Spacing::Equal) => None,
-            // Lengths are in the unit of the results here.
-            _ => {
-                let largest = match unfold.largest(1.0) {
-                    LargestSize::Given(size) => size,
-                    _ => f64::NAN,
-                };
-                Some(unfold.size_edges(&[], largest, 1.0)?)
-            }
-        };
         Ok(SynthesisOptions {
             pixel: everywhere.scale,
             segment: self.segment.options(seed),
-            densities: DensityOptions {
-                bins: match unfold.bins {
-                    None => BINS,
-                    Some(BinCount::Number(bins)) => bins,
-                    Some(BinCount::Auto) => 0,
-                },
-                edges,
-                max_size: unfold.largest(1.0),
-                capping: unfold.capping(),
-                sizes: unfold.sizes(),
-                unfold: Unfolding {
-                    bootstrap: unfold.bootstrap.or(Some(REPLICATES)),
-                    ..unfold.clone()
-                }
-                .unfold_options(1.0, seed)?,
-            },
+            densities: self.unfold.density_options(1.0, seed, &DEFAULTS),
             extent: match (self.solid.side, self.solid.count) {
                 (Some(side), _) => Extent::Side(side),
                 (None, Some(count)) => Extent::Count(count),

@@ -1,13 +1,11 @@
 //! From measured profiles to particles per volume, colour category by colour category where size and colour go together.
 
 use crate::pipeline::association::{Association, association};
-use crate::pipeline::{
-    Capping, LargestSize, ParticleTypes, ParticleTypesError, Warning, capping_angle, largest_particle,
-};
+use crate::pipeline::fitting::Fitting;
+use crate::pipeline::{Capping, LargestSize, ParticleTypes, ParticleTypesError, Spacing, Warning};
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
-    Finding, Kernel, Method, ProfileCounts, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, automatic_bins,
-    divided_edges, equal_edges, unfold, unfold_with_progress,
+    Kernel, Method, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, divided_edges, unfold, unfold_with_progress,
 };
 
 /// What was measured on the photograph: one entry a profile in each.
@@ -21,6 +19,8 @@ pub struct MeasuredProfiles {
     pub categories: Vec<u8>,
     /// Slices they are on, from 0, one a profile; empty if there is one slice, or it is not known.
     pub slices: Vec<usize>,
+    /// Types of the particles they are cuts of, from 0, one a profile; empty if it is not known.
+    pub types: Vec<usize>,
     /// Area examined; length squared.
     pub area: f64,
     /// Profiles up to this size are lost.
@@ -32,6 +32,8 @@ pub struct MeasuredProfiles {
 pub struct DensityOptions {
     /// Size bins between 0 and the largest size; 0: as many as the profiles bear ([`automatic_bins`]).
     pub bins: usize,
+    /// How they are spaced.
+    pub spacing: Spacing,
     /// Edges of the size bins instead.
     pub edges: Option<Vec<f64>>,
     /// Largest particle size; by default that of the largest counted profile.
@@ -49,6 +51,7 @@ impl Default for DensityOptions {
     fn default() -> Self {
         Self {
             bins: 16,
+            spacing: Spacing::Equal,
             edges: None,
             max_size: LargestSize::Profile,
             capping: Capping::None,
@@ -82,6 +85,19 @@ pub enum DensityError {
         "no profile counts: all {0} lie outside the counting frame or touch the edge; take a larger photograph or --edge-rule all"
     )]
     NoProfiles(usize),
+    /// Geometric bins of sizes that do not bear them.
+    #[error(
+        "bins of equal ratio need two or more of them, and sizes that differ (smallest {smallest}, largest {largest}): give both sizes, or take equal bins"
+    )]
+    Spacing {
+        /// The smallest size.
+        smallest: f64,
+        /// The largest.
+        largest: f64,
+    },
+    /// A type there is no body for, or a type without profiles.
+    #[error("{0}")]
+    Labels(String),
     /// The profiles.
     #[error(transparent)]
     Profiles(#[from] ProfilesError),
@@ -110,7 +126,7 @@ pub enum DensityError {
 ///
 /// // Cuts through spheres of diameter 10, at evenly spread depths: N_A = D N_V.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
-/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], slices: vec![], area: 1e5, min_size: 0.0, sizes };
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
 /// let found = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// assert!((found.all.total.value / (300.0 / 1e5 / 10.0) - 1.0).abs() < 0.15);
@@ -122,71 +138,15 @@ pub fn particle_densities(
     options: &DensityOptions,
     progress: stereology_unfold::Progress<'_>,
 ) -> Result<ParticleDensities, DensityError> {
-    let counted = |i: &usize| profiles.weights[*i] > 0.0;
-    let places: Vec<usize> = (0..profiles.sizes.len()).filter(counted).collect();
-    if places.is_empty() {
-        return Err(DensityError::NoProfiles(profiles.sizes.len()));
-    }
-    let edges = match &options.edges {
-        Some(edges) => edges.clone(),
-        None => {
-            let (largest, _) = largest_particle(profiles, types, options.max_size, &options.unfold)?;
-            let counted: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
-            let bins = match options.bins {
-                0 => automatic_bins(&counted, largest, MOST_BINS),
-                bins => bins,
-            };
-            equal_edges(largest, bins)
-        }
-    };
-    let threshold = settled_threshold(&edges, options.unfold.min_size.unwrap_or(profiles.min_size));
-    let unfolding = UnfoldOptions {
-        min_size: (threshold > 0.0).then_some(threshold),
-        ..options.unfold
-    };
-    let fit_bins = types.unfolding_bins(&edges, threshold, options.unfold.method, options.sizes);
-    let (angle, _) = capping_angle(profiles, types, options.capping, &edges, &unfolding)?;
-    let kernel = reported(types.capped_kernel(angle, &fit_bins, options.sizes)?, &edges)?;
-    let unfold_these = |places: &[usize], options: &UnfoldOptions| {
-        let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
-        let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
-        let counts = if profiles.slices.is_empty() {
-            ProfileCounts::from_sizes(&sizes, Some(&weights), &fit_bins.profile_edges, profiles.area)?
-        } else {
-            let slices: Vec<usize> = places.iter().map(|&i| profiles.slices[i]).collect();
-            ProfileCounts::from_slices(&sizes, Some(&weights), &slices, &fit_bins.profile_edges, profiles.area)?
-        };
-        Ok::<_, DensityError>(unfold_with_progress(&counts, &kernel, options, progress)?)
-    };
-    let mut all = unfold_these(&places, &unfolding)?;
-    // What the findings would be in fewer bins, to name the number that cures them.
-    let in_fewer = |bins: usize| -> Vec<Finding> {
-        let edges = equal_edges(edges[edges.len() - 1], bins);
-        let bins = types.unfolding_bins(&edges, threshold, unfolding.method, options.sizes);
-        let found = || {
-            let kernel = types.capped_kernel(angle, &bins, options.sizes)?;
-            let sizes: Vec<f64> = places.iter().map(|&i| profiles.sizes[i]).collect();
-            let weights: Vec<f64> = places.iter().map(|&i| profiles.weights[i]).collect();
-            let counts = ProfileCounts::from_sizes(&sizes, Some(&weights), &bins.profile_edges, profiles.area)?;
-            let options = UnfoldOptions {
-                bootstrap: None,
-                ..unfolding
-            };
-            Ok::<_, DensityError>(unfold(&counts, &reported(kernel, &edges)?, &options)?.findings)
-        };
-        found().unwrap_or_default()
-    };
-    let bins = edges.len() - 1;
-    if unfolding.method != Method::Paper {
-        all.rebin_profiles(&histogram_edges(&edges, threshold));
+    let fitting = Fitting::new(profiles, types, options)?;
+    let places = fitting.counted();
+    let (counts, kernel) = fitting.part(&places, None)?;
+    let mut all = unfold_with_progress(&counts, &kernel, &fitting.unfold, progress)?;
+    all.findings = fitting.cured(&all.findings, &places, None);
+    if let Some(edges) = fitting.histogram_edges() {
+        all.rebin_profiles(&edges);
     }
     let profile_edges = all.profile_edges.clone();
-    all.findings = all
-        .findings
-        .iter()
-        .map(|finding| finding.with_cure(bins, &in_fewer))
-        .collect();
-
     let of_category = |category: usize| -> Vec<usize> {
         places
             .iter()
@@ -204,7 +164,7 @@ pub fn particle_densities(
     let association = association(&groups.iter().map(sizes_of).collect::<Vec<_>>());
     let without_intervals = UnfoldOptions {
         bootstrap: None,
-        ..unfolding
+        ..fitting.unfold
     };
     let weight_of = |group: &[usize]| group.iter().map(|&i| profiles.weights[i]).sum::<f64>();
     let whole = weight_of(&places);
@@ -212,7 +172,8 @@ pub fn particle_densities(
         .iter()
         .map(|group| {
             if association.together && !group.is_empty() {
-                return Ok(unfold_these(group, &without_intervals)?.number_density);
+                let (counts, kernel) = fitting.part(group, None)?;
+                return Ok(unfold(&counts, &kernel, &without_intervals)?.number_density);
             }
             let share = weight_of(group) / whole;
             Ok(all
@@ -231,11 +192,6 @@ pub fn particle_densities(
     })
 }
 
-/// The reported bins cut in halves, with an edge at the threshold: as fine as a histogram of some hundred profiles can be.
-fn histogram_edges(edges: &[f64], threshold: f64) -> Vec<f64> {
-    divided_edges(edges, 2 * (edges.len() - 1), threshold)
-}
-
 /// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
 /// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -248,8 +204,6 @@ pub struct UnfoldingBins {
 
 /// A hundred profile bins or more lose nothing that shows in the densities.
 const PROFILE_BINS: usize = 100;
-/// More bins than this are not chosen automatically.
-const MOST_BINS: usize = 50;
 /// Forty size bins or more make the smooth estimate as smooth as can be seen.
 const SIZE_BINS: usize = 40;
 
@@ -320,22 +274,6 @@ pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityE
         .reported_in(edges)
         .map_err(|error| DensityError::Unfold(UnfoldError::Edges(error)))
 }
-
-/// The threshold, raised to the upper edge of its bin if that edge is less than [`SEEN`] times the threshold: a plane that cuts a sphere of diameter D shows it
-/// above t with probability √(1 − (t / D)²), and where that is small hardly any profile tells of such particles and their density would be anything.
-fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
-    let bin = size_edges
-        .windows(2)
-        .find(|bin| bin[0] < threshold && threshold < bin[1]);
-    match bin {
-        // Above the last edge there is nothing.
-        Some(bin) if bin[1] < SEEN * threshold && Some(&bin[1]) != size_edges.last() => bin[1],
-        _ => threshold,
-    }
-}
-
-/// At this many thresholds three quarters of a sphere's profiles are seen.
-const SEEN: f64 = 1.5;
 
 impl ParticleDensities {
     /// Number density of a size bin, the categories added up; `None` below the threshold.

@@ -126,6 +126,15 @@ impl ParticleTypes {
         Ok(self)
     }
 
+    /// One of the types, as if there were no other.
+    pub(crate) fn only(&self, index: usize) -> Self {
+        let types = self.types[index..=index].iter().map(|of| ParticleType {
+            share: 1.0,
+            ..of.clone()
+        });
+        Self { types: types.collect() }
+    }
+
     /// Types from words, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file.
     ///
     /// # Errors

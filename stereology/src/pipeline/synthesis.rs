@@ -288,6 +288,7 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         weights: profiles.iter().map(|profile| profile.weight).collect(),
         categories: profiles.iter().map(|profile| profile.category).collect(),
         slices: Vec::new(),
+        types: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
         // A profile of exactly the least area was kept: the threshold lies just below it.
         min_size: segmentation.min_size * pixel * (1.0 - 1e-9),

@@ -36,10 +36,9 @@ proptest! {
         let profiles = MeasuredProfiles {
             weights: vec![1.0; count],
             categories: vec![0; count],
-            slices: Vec::new(),
             area: 3.0 * f64::from(planes) * side * side,
-            min_size: 0.0,
             sizes,
+            ..MeasuredProfiles::default()
         };
         let found = particle_densities(&profiles, &types, &DensityOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
         prop_assert!((found.all.total.value / number_density - 1.0).abs() < 0.15, "{} {number_density}", found.all.total.value);
@@ -79,7 +78,7 @@ proptest! {
         let types = ParticleTypes::parse(&["sphere", "box:1,1,2"]).unwrap();
         let count = sizes.len();
         let categories = (0..count).map(|i| (i % 3) as u8).collect();
-        let profiles = MeasuredProfiles { weights: vec![1.0; count], categories, slices: vec![], area: 500.0 * 500.0, min_size, sizes };
+        let profiles = MeasuredProfiles { weights: vec![1.0; count], categories, area: 500.0 * 500.0, min_size, sizes, ..MeasuredProfiles::default() };
         let options = DensityOptions {
             sizes: if upper { Sizes::UpperEdge } else { Sizes::Integrated },
             unfold: UnfoldOptions::default().with_method(Method::Nnls),

@@ -1,19 +1,21 @@
-//! Tables of the estimators on figure 7's distributions: how far they are off, and how often their intervals hold the truth.
+//! Tables of the estimators on figure 7's distributions: how far they are off, how often their intervals hold the truth, how long they take.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::Result;
 use rayon::prelude::*;
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{ParticleTypes, UnfoldingBins};
 use stereology::unfold::{
-    Bootstrap, Estimate, Interval, Kernel, Method, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold,
+    Bootstrap, Estimate, Interval, Kernel, Method, ProfileCounts, Resampling, UnfoldOptions, Unfolding, equal_edges,
+    unfold,
 };
 
 use super::grain_size_tools::saltykov;
-use super::sphere_samples::{AREA, BAND_ON_MODE, Diameters, FEW, FIGURE_7, Population, TWO_BANDS, scores};
+use super::sphere_samples::{AREA, BAND_ON_MODE, Diameters, FEW, FIGURE_7, Population, Profiles, TWO_BANDS, scores};
 
 const BINS: usize = 10;
 const SEEDS: u64 = 200;
@@ -47,8 +49,9 @@ impl Estimator {
         })
     }
 
-    fn unfold(&self, profiles: &[f64], bootstrap: Option<Bootstrap>) -> Result<Unfolding> {
-        let counts = ProfileCounts::from_sizes(profiles, None, &self.profile_edges, AREA)?;
+    fn unfold(&self, profiles: &Profiles, bootstrap: Option<Bootstrap>) -> Result<Unfolding> {
+        let Profiles { sizes, planes, .. } = profiles;
+        let counts = ProfileCounts::from_slices(sizes, None, planes, &self.profile_edges, AREA)?;
         let options = UnfoldOptions {
             method: self.method,
             bootstrap,
@@ -87,7 +90,7 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
         for estimator in &estimators {
             let found = (0..SEEDS)
                 .into_par_iter()
-                .map(|seed| estimator.unfold(&population.profiles(seed).0, None))
+                .map(|seed| estimator.unfold(&population.profiles(seed), None))
                 .collect::<Result<Vec<_>>>()?;
             let all: Vec<[f64; 3]> = found.iter().map(|found| scores(&densities(found), &truth)).collect();
             let sparse = found.iter().filter(|found| found.method == Method::Sparse).count();
@@ -107,7 +110,7 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
         let all: Vec<[f64; 3]> = (0..SEEDS)
             .map(|seed| {
                 // On common classes; by itself it ends them at the largest profile. It has no total.
-                scores(&saltykov(&population.profiles(seed).0, 1.0, BINS), &truth)
+                scores(&saltykov(&population.profiles(seed).sizes, 1.0, BINS), &truth)
             })
             .collect();
         let line = mean(&all);
@@ -130,7 +133,7 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
 /// The least error there can be: every profile with the diameter of its sphere, weighed by 1 / D.
 fn by_cut_spheres(population: &Population, seed: u64) -> Vec<f64> {
     let mut found = vec![0.0; BINS];
-    for diameter in population.profiles(seed).1 {
+    for diameter in population.profiles(seed).cut {
         let bin = ((diameter * BINS as f64).ceil() as usize).clamp(1, BINS) - 1;
         found[bin] += 1.0 / (AREA * diameter);
     }
@@ -156,36 +159,38 @@ fn holds(interval: Option<Interval>, truth: f64) -> f64 {
 /// The table of coverage: how often nominal 90 % intervals of 200 replicates hold the truth, 200 samples each, other samples for each distribution.
 pub fn draw_coverage(folder: &Path) -> Result<()> {
     let auto = Estimator::new("auto", Method::Auto, Sizes::Integrated, None)?;
-    let mut text = String::from("distribution,total,mean_size,volume_fraction,bins,worst_bin,width_of_total\n");
-    let mut pooled = [0.0; 4];
-    for (index, of) in FIGURE_7.iter().chain([&TWO_BANDS]).enumerate() {
-        let (held, width) = coverage(&auto, of, 10_000 * (index as u64 + 1))?;
-        let worst = held.worst_bin.iter().copied().fold(1.0, f64::min);
-        let values = [held.total, held.mean_size, held.volume_fraction, held.bins];
-        if index < FIGURE_7.len() {
-            pooled
-                .iter_mut()
-                .zip(values)
-                .for_each(|(sum, value)| *sum += value / FIGURE_7.len() as f64);
-        }
-        writeln!(
-            text,
-            "{},{:.3},{:.3},{:.3},{:.3},{worst:.3},{width:.3}",
-            of.name, values[0], values[1], values[2], values[3]
-        )?;
-        if index + 1 == FIGURE_7.len() {
+    let mut text = String::from("drawn,distribution,total,mean_size,volume_fraction,bins,worst_bin,width_of_total\n");
+    for (drawn, resampling) in [("counts", Resampling::Counts), ("slices", Resampling::Slices)] {
+        let mut pooled = [0.0; 4];
+        for (index, of) in FIGURE_7.iter().chain([&TWO_BANDS]).enumerate() {
+            let (held, width) = coverage(&auto, of, 10_000 * (index as u64 + 1), resampling)?;
+            let worst = held.worst_bin.iter().copied().fold(1.0, f64::min);
+            let values = [held.total, held.mean_size, held.volume_fraction, held.bins];
+            if index < FIGURE_7.len() {
+                pooled
+                    .iter_mut()
+                    .zip(values)
+                    .for_each(|(sum, value)| *sum += value / FIGURE_7.len() as f64);
+            }
             writeln!(
                 text,
-                "the four pooled,{:.3},{:.3},{:.3},{:.3},,",
-                pooled[0], pooled[1], pooled[2], pooled[3]
+                "{drawn},{},{:.3},{:.3},{:.3},{:.3},{worst:.3},{width:.3}",
+                of.name, values[0], values[1], values[2], values[3]
             )?;
+            if index + 1 == FIGURE_7.len() {
+                writeln!(
+                    text,
+                    "{drawn},the four pooled,{:.3},{:.3},{:.3},{:.3},,",
+                    pooled[0], pooled[1], pooled[2], pooled[3]
+                )?;
+            }
         }
     }
     print!("{text}");
     Ok(fs::write(folder.join("coverage.csv"), text)?)
 }
 
-fn coverage(estimator: &Estimator, of: &Diameters, first_seed: u64) -> Result<(Held, f64)> {
+fn coverage(estimator: &Estimator, of: &Diameters, first_seed: u64, resampling: Resampling) -> Result<(Held, f64)> {
     let population = of.population();
     let truth = population.densities(BINS);
     let all = (0..SEEDS)
@@ -193,9 +198,10 @@ fn coverage(estimator: &Estimator, of: &Diameters, first_seed: u64) -> Result<(H
         .map(|seed| {
             let bootstrap = Bootstrap {
                 seed,
+                resampling,
                 ..Bootstrap::default()
             };
-            estimator.unfold(&population.profiles(first_seed + seed).0, Some(bootstrap))
+            estimator.unfold(&population.profiles(first_seed + seed), Some(bootstrap))
         })
         .collect::<Result<Vec<_>>>()?;
     let (mut held, mut width) = (Held::default(), 0.0);
@@ -213,4 +219,49 @@ fn coverage(estimator: &Estimator, of: &Diameters, first_seed: u64) -> Result<(H
         width += found.total.interval.map_or(0.0, |of| of.upper - of.lower) / population.number_density * share;
     }
     Ok((held, width))
+}
+
+/// Samples a time is the mean of.
+const TIMED: u64 = 20;
+/// Runs of which the fastest counts: the others were held up by something else.
+const RUNS: usize = 10;
+
+/// The table of times on one thread: a default fit, one with 200 replicates, and a million profiles counted and fitted.
+pub fn draw_speed(folder: &Path) -> Result<()> {
+    let auto = Estimator::new("auto", Method::Auto, Sizes::Integrated, None)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let fastest = |runs: usize, profiles: &Profiles, bootstrap: Option<Bootstrap>| -> Result<f64> {
+        let mut least = f64::INFINITY;
+        for _ in 0..runs {
+            let start = Instant::now();
+            pool.install(|| auto.unfold(profiles, bootstrap))?;
+            least = least.min(1e3 * start.elapsed().as_secs_f64());
+        }
+        Ok(least)
+    };
+    let mut text = String::from("distribution,fit_ms,slowest_fit_ms,fit_with_200_replicates_ms\n");
+    for of in FIGURE_7.iter().chain([&TWO_BANDS, &BAND_ON_MODE]) {
+        let population = of.population();
+        let samples: Vec<Profiles> = (0..TIMED).map(|seed| population.profiles(seed)).collect();
+        let fits = samples
+            .iter()
+            .map(|of| fastest(RUNS, of, None))
+            .collect::<Result<Vec<f64>>>()?;
+        let replicated = fastest(3, &samples[0], Some(Bootstrap::default()))?;
+        let slowest = fits.iter().copied().fold(0.0, f64::max);
+        writeln!(
+            text,
+            "{},{:.2},{slowest:.2},{replicated:.1}",
+            of.name,
+            fits.iter().sum::<f64>() / TIMED as f64
+        )?;
+    }
+    let million = Profiles {
+        sizes: (1..=1_000_000).map(|k| f64::from(k) / 1e6).collect(),
+        planes: (0..1_000_000).map(|k| k % 10).collect(),
+        cut: Vec::new(),
+    };
+    writeln!(text, "a million profiles,{:.1},,", fastest(5, &million, None)?)?;
+    print!("{text}");
+    Ok(fs::write(folder.join("speed.csv"), text)?)
 }

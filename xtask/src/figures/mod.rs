@@ -19,7 +19,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 14] = [
+    let figures: [(&str, Figure); 15] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -28,8 +28,9 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("figure-06-residual", solids::draw_residual),
         ("figure-07-density-recovery", density_recovery::draw),
         ("figure-08-recovered-volume", density_recovery::draw_volumes),
-        ("estimators", estimators::draw_errors),
-        ("coverage", estimators::draw_coverage),
+        ("unfolding-estimators", estimators::draw_errors),
+        ("unfolding-coverage", estimators::draw_coverage),
+        ("unfolding-speed", estimators::draw_speed),
         ("figure-09-particles", particles::draw_shapes),
         ("packing", packings::draw),
         ("texture", textures::draw),

@@ -108,6 +108,17 @@ impl Diameters {
     }
 }
 
+/// Profiles of a sample.
+#[derive(Default)]
+pub struct Profiles {
+    /// Their diameters.
+    pub sizes: Vec<f64>,
+    /// Those of the spheres they are cuts of.
+    pub cut: Vec<f64>,
+    /// The plane each is on.
+    pub planes: Vec<usize>,
+}
+
 impl Population {
     /// A diameter.
     pub fn draw(&self, rng: &mut ChaCha8Rng) -> f64 {
@@ -130,13 +141,13 @@ impl Population {
             .collect()
     }
 
-    /// Diameters of the profiles, and the slice each is on.
-    pub fn profiles(&self, seed: u64) -> (Vec<f64>, Vec<f64>) {
+    /// What the planes show.
+    pub fn profiles(&self, seed: u64) -> Profiles {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let expected = self.number_density * SIDE.powi(3);
         let count = Poisson::new(expected).map_or(0.0, |of| of.sample(&mut rng));
         let offset: f64 = rng.random();
-        let (mut profiles, mut cut) = (Vec::new(), Vec::new());
+        let mut profiles = Profiles::default();
         let mut left = count;
         while left > 0.0 {
             left -= 1.0;
@@ -146,12 +157,13 @@ impl Population {
                 let apart = (height - (plane as f64 + offset) * SIDE / PLANES as f64).abs();
                 let chord = diameter.powi(2) - 4.0 * apart.min(SIDE - apart).powi(2);
                 if chord > 0.0 {
-                    profiles.push(chord.sqrt());
-                    cut.push(diameter);
+                    profiles.sizes.push(chord.sqrt());
+                    profiles.cut.push(diameter);
+                    profiles.planes.push(plane);
                 }
             }
         }
-        (profiles, cut)
+        profiles
     }
 }
 

@@ -4,20 +4,20 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{Capping, LargestSize, ParticleTypes};
-use stereology::unfold::{
-    self, Bootstrap, Resampling, UnfoldOptions, automatic_bins, equal_edges, geometric_edges, phi_edges,
-};
+use stereology::pipeline::{self, Capping, DensityOptions, LargestSize, ParticleTypes};
+use stereology::unfold::{self, Bootstrap, Resampling, UnfoldOptions};
 
 use crate::failure::{Explain, Failure, body};
-use crate::profile_table::TableProfile;
 use crate::values::{BinCount, CappingAngle, Edges, MaxSize, ShapeShare, count, positive, share, shares};
 
-/// Size bins if not given.
-pub const BINS: usize = 10;
-
-/// More bins than this are not chosen automatically.
-const MOST_AUTOMATIC_BINS: usize = 50;
+/// What a command takes if it is not told.
+#[derive(Clone, Copy, Debug)]
+pub struct Defaults {
+    /// Size bins.
+    pub bins: usize,
+    /// Bootstrap replicates.
+    pub replicates: Option<usize>,
+}
 
 /// How to unfold.
 #[derive(Args, Clone, Debug)]
@@ -147,30 +147,45 @@ impl Choices {
         types(&self.shape)
     }
 
-    /// The estimator with its threshold and intervals; lengths of the options are multiplied by `scale`.
-    pub fn unfold_options(&self, scale: f64, seed: u64) -> Result<UnfoldOptions, Failure> {
-        let mut options = UnfoldOptions::default().with_method(self.method.estimator());
-        if let Some(min_size) = self.min_size {
-            options = options.with_min_size(min_size * scale);
+    /// All of them but the types; `defaults` where neither bins nor replicates are given. Lengths of the options are multiplied by `scale`.
+    pub fn density_options(&self, scale: f64, seed: u64, defaults: &Defaults) -> DensityOptions {
+        DensityOptions {
+            bins: match self.bins {
+                None => defaults.bins,
+                Some(BinCount::Number(bins)) => bins,
+                Some(BinCount::Auto) => 0,
+            },
+            spacing: match self.spacing {
+                Spacing::Equal => pipeline::Spacing::Equal,
+                Spacing::Geometric => pipeline::Spacing::Geometric,
+                Spacing::Phi => pipeline::Spacing::Phi,
+            },
+            edges: self
+                .edges
+                .as_ref()
+                .map(|Edges(edges)| edges.iter().map(|edge| edge * scale).collect()),
+            max_size: self.largest(scale),
+            capping: self.capping(),
+            sizes: self.sizes(),
+            unfold: UnfoldOptions {
+                method: self.method.estimator(),
+                min_size: self.min_size.map(|size| size * scale),
+                bootstrap: self.bootstrap.or(defaults.replicates).map(|replicates| Bootstrap {
+                    replicates,
+                    level: self.level,
+                    seed,
+                    resampling: match self.resample {
+                        Resample::Counts => Resampling::Counts,
+                        Resample::Slices => Resampling::Slices,
+                    },
+                }),
+                ..UnfoldOptions::default()
+            },
         }
-        if let Some(replicates) = self.bootstrap {
-            let mut bootstrap = Bootstrap {
-                replicates,
-                ..Bootstrap::default()
-            };
-            bootstrap.level = self.level;
-            bootstrap.seed = seed;
-            bootstrap.resampling = match self.resample {
-                Resample::Counts => Resampling::Counts,
-                Resample::Slices => Resampling::Slices,
-            };
-            options = options.with_bootstrap(bootstrap);
-        }
-        Ok(options)
     }
 
     /// The largest size, lengths multiplied by `scale`.
-    pub fn largest(&self, scale: f64) -> LargestSize {
+    fn largest(&self, scale: f64) -> LargestSize {
         match self.max_size {
             None | Some(MaxSize::Profile) => LargestSize::Profile,
             Some(MaxSize::Corrected) => LargestSize::Corrected,
@@ -180,53 +195,11 @@ impl Choices {
     }
 
     /// What is lost at the rims.
-    pub fn capping(&self) -> Capping {
+    fn capping(&self) -> Capping {
         match self.capping_angle {
             None => Capping::None,
             Some(CappingAngle::Degrees(angle)) => Capping::Angle(angle.to_radians()),
             Some(CappingAngle::Fit) => Capping::Likelihood,
-        }
-    }
-
-    /// Edges of the size bins up to the largest size, for profiles of these sizes.
-    pub fn size_edges(&self, profiles: &[TableProfile], largest: f64, scale: f64) -> Result<Vec<f64>, Failure> {
-        if let Some(Edges(edges)) = &self.edges {
-            return Ok(edges.iter().map(|edge| edge * scale).collect());
-        }
-        let counted = || {
-            profiles
-                .iter()
-                .filter(|profile| profile.weight > 0.0)
-                .map(|profile| profile.size)
-        };
-        let count = match self.bins {
-            None => BINS,
-            Some(BinCount::Number(count)) => count,
-            Some(BinCount::Auto) => automatic_bins(&counted().collect::<Vec<_>>(), largest, MOST_AUTOMATIC_BINS),
-        };
-        match self.spacing {
-            Spacing::Equal => Ok(equal_edges(largest, count)),
-            Spacing::Phi => {
-                let smallest = self
-                    .min_size
-                    .map_or_else(|| counted().fold(f64::INFINITY, f64::min), |size| size * scale);
-                if !(smallest.is_finite() && largest > 0.0) {
-                    return Err(Failure::usage("--spacing phi needs --min-size and --max-size here"));
-                }
-                Ok(phi_edges(smallest, largest, 0.5))
-            }
-            Spacing::Geometric => {
-                // The first bin is everything up to the smallest size that is seen.
-                let smallest = self
-                    .min_size
-                    .map_or_else(|| counted().fold(f64::INFINITY, f64::min), |size| size * scale);
-                if count < 2 || smallest.is_nan() || smallest >= largest {
-                    return Err(Failure::usage(
-                        "--spacing geometric needs two or more bins, and sizes that differ; give --min-size and --max-size, or --spacing equal",
-                    ));
-                }
-                Ok(geometric_edges(smallest, largest, count - 1))
-            }
         }
     }
 }

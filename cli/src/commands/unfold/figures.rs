@@ -1,7 +1,8 @@
 //! What an unfolding is in JSON.
 
 use serde_json::{Value, json};
-use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, Unfolding};
+use stereology::pipeline::CategoryDensities;
+use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, TypesUnfolding, Unfolding};
 
 /// Fields of the JSON object that an unfolding fills.
 pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
@@ -43,6 +44,7 @@ pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
         ("condition_number", json!(found.condition_number)),
         ("penalty", json!(found.penalty.map(|penalty| penalty.weight))),
         ("penalty_order", json!(found.penalty.map(|penalty| penalty.order))),
+        ("penalty_bend", json!(found.penalty.and_then(|penalty| penalty.bend))),
         ("evidence_for_sparse", json!(found.evidence_for_sparse)),
         ("method", json!(found.method.name())),
         ("kernel", json!(kernel)),
@@ -57,6 +59,82 @@ pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
         ),
     ]);
     fields
+}
+
+/// What is told of a group of profiles, or of all groups together.
+pub struct Group<'a> {
+    number_density: &'a [Option<f64>],
+    intervals: Option<&'a [Option<Interval>]>,
+    scalars: [(&'static str, Estimate); 3],
+}
+
+impl<'a> Group<'a> {
+    /// One of them.
+    fn of(found: &'a Unfolding) -> Self {
+        Self {
+            number_density: &found.number_density,
+            intervals: found.intervals.as_deref(),
+            scalars: [
+                ("total", found.total),
+                ("mean_size", found.mean_size),
+                ("volume_fraction", found.volume_fraction),
+            ],
+        }
+    }
+
+    /// All together.
+    pub fn sum(found: &'a TypesUnfolding) -> Self {
+        Self {
+            number_density: &found.number_density,
+            intervals: found.intervals.as_deref(),
+            scalars: [
+                ("total", found.total),
+                ("mean_size", found.mean_size),
+                ("volume_fraction", found.volume_fraction),
+            ],
+        }
+    }
+}
+
+/// Densities and totals of a group.
+pub fn group_figures(of: &Group<'_>) -> Value {
+    let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
+        of.intervals
+            .map(|intervals| intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
+    };
+    let mut fields = json!({
+        "number_density": of.number_density,
+        "lower": ends(|interval| interval.lower),
+        "upper": ends(|interval| interval.upper),
+    });
+    for (name, estimate) in of.scalars {
+        fields[name] = json!(estimate.value);
+        if let Some(interval) = estimate.interval {
+            fields[format!("{name}_lower")] = json!(interval.lower);
+            fields[format!("{name}_upper")] = json!(interval.upper);
+        }
+    }
+    fields
+}
+
+/// Every category, and every type of it where types are told apart.
+pub fn categories(of: &CategoryDensities) -> Vec<Value> {
+    let groups = of.categories.iter().zip(&of.kinds).zip(&of.found.types);
+    groups
+        .map(|((category, kind), found)| {
+            let mut fields = group_figures(&Group::of(found));
+            fields["category"] = json!(category);
+            fields["type"] = json!(kind);
+            fields["profiles"] = json!(found.profiles);
+            fields["method"] = json!(found.method.name());
+            fields["findings"] = found
+                .findings
+                .iter()
+                .map(|finding| json!({ "code": finding.code(), "message": finding.to_string() }))
+                .collect();
+            fields
+        })
+        .collect()
 }
 
 /// Mean and percentiles.

@@ -1,6 +1,7 @@
 //! `stereology unfold`: profiles per area -> particles per volume.
 
 mod choices;
+mod edge_rule;
 mod figures;
 
 use std::path::PathBuf;
@@ -9,12 +10,10 @@ use clap::Args;
 use serde_json::{Value, json};
 use stereology::files::DensityRows;
 use stereology::pipeline::{
-    Capping, DensityOptions, MeasuredProfiles, ParticleTypes, capping_angle, largest_particle, particle_densities,
-    type_shares,
+    Capping, CategoryDensities, DensityOptions, MeasuredProfiles, Spacing, capping_angle, category_densities,
+    largest_particle, particle_densities, size_edges, type_densities, type_shares,
 };
-use stereology::unfold::{
-    self, Estimate, Interval, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold_types_with_progress,
-};
+use stereology::unfold::{Estimate, Interval, TypesUnfolding, Unfolding, equal_edges};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -23,11 +22,19 @@ use crate::numbers::{percent, significant};
 use crate::outputs::check_file;
 use crate::profile_table::{TableProfile, read_profiles};
 use crate::progress::{Step, go_on};
-use crate::values::positive;
+use crate::values::{Window, positive};
 use crate::warnings::Warning;
 
-pub use choices::{Choices, Spacing, types};
+pub use choices::{Choices, Defaults, types};
+pub use edge_rule::EdgeRule;
 pub use figures::figures;
+use figures::{Group, categories, group_figures};
+
+/// Ten bins, and no intervals unless asked.
+const DEFAULTS: Defaults = Defaults {
+    bins: 10,
+    replicates: None,
+};
 
 /// From the sizes of the profiles on a cut to the number and sizes of the particles in the solid
 ///
@@ -36,11 +43,13 @@ pub use figures::figures;
 ///
 /// PROFILES.csv has a column `size` (diameter of the circle with the profile's area) or `area`; if present, `type` (0-based index of --shape), `category`,
 /// `weight` (multiplies the count) and `slice` are used too. Other columns are ignored; the `profiles.csv` of `stereology segment` is such a table. --area is
-/// the total area examined: without it there are no absolute numbers.
+/// the total area examined: without it there are no absolute numbers. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs
+/// the box around each profile in columns `left`, `top`, `right`, `bottom` and the size of a slice.
 ///
 /// With --scale all lengths given here, in the table and in options, are multiplied by it.
 ///
 /// With several --shape and no `type` column all types share one size distribution in the given fractions (eqs. 10-12); with types each has its own (eq. 9).
+/// With several categories each is unfolded by itself too, on the same bins, and their sum.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology unfold out/profiles.csv --area 307200 --bins 10 --shape rock:1 -o densities.csv"
@@ -54,6 +63,12 @@ pub struct Unfold {
     pub area: f64,
     #[command(flatten)]
     pub choices: Choices,
+    /// Weigh profiles at the edges by this rule instead of the column `weight`; needs the columns left, top, right, bottom and --window (all and inside: touches_edge will do)
+    #[arg(long, value_enum, help_heading = "Unfolding")]
+    pub edge_rule: Option<EdgeRule>,
+    /// Width and height of a slice, for --edge-rule
+    #[arg(long, value_name = "WIDTH,HEIGHT", help_heading = "Unfolding")]
+    pub window: Option<Window>,
     /// Find the shares of several --shape from the profiles; refused where these do not tell
     #[arg(long, help_heading = "Unfolding")]
     pub unknown_fractions: bool,
@@ -62,16 +77,43 @@ pub struct Unfold {
     pub output: Option<PathBuf>,
 }
 
-/// The slice of every profile, if all have one.
-fn slices(profiles: &[TableProfile]) -> Vec<usize> {
-    let slices: Option<Vec<usize>> = profiles.iter().map(|profile| profile.slice).collect();
-    slices.unwrap_or_default()
+/// What the table tells of every profile; nothing if it does not of some.
+fn all(profiles: &[TableProfile], of: impl Fn(&TableProfile) -> Option<usize>) -> Vec<usize> {
+    let told: Option<Vec<usize>> = profiles.iter().map(of).collect();
+    told.unwrap_or_default()
+}
+
+/// Several types as one unfolding: eq. (9). Method, penalty and threshold are those of the first; findings stay with their types.
+fn summed(found: &TypesUnfolding) -> Unfolding {
+    let mut sum = found.types[0].clone();
+    sum.number_density.clone_from(&found.number_density);
+    sum.intervals.clone_from(&found.intervals);
+    (sum.total, sum.mean_size, sum.volume_fraction) = (found.total, found.mean_size, found.volume_fraction);
+    (sum.surface_density, sum.distribution) = (found.surface_density, found.distribution.clone());
+    sum.observed.clone_from(&found.observed);
+    sum.refolded.clone_from(&found.refolded);
+    sum.findings.clear();
+    for part in &found.types[1..] {
+        sum.profiles += part.profiles;
+        for (sum, part) in [
+            (&mut sum.profiles_per_area, part.profiles_per_area),
+            (&mut sum.area_fraction, part.area_fraction),
+        ] {
+            sum.observed += part.observed;
+            sum.expected += part.expected;
+        }
+        sum.deviance += part.deviance;
+        sum.degrees_of_freedom += part.degrees_of_freedom;
+        sum.condition_number = sum.condition_number.max(part.condition_number);
+        sum.clamped_bins.extend(&part.clamped_bins);
+    }
+    sum
 }
 
 /// As many equal bins as there are profiles, if more were asked for.
-fn fewer_bins(edges: &[f64], profiles: &MeasuredProfiles, choices: &Choices) -> Option<Vec<f64>> {
+fn fewer_bins(edges: &[f64], profiles: &MeasuredProfiles, options: &DensityOptions) -> Option<Vec<f64>> {
     let counted = profiles.weights.iter().filter(|weight| **weight > 0.0).count();
-    let equal = choices.edges.is_none() && choices.spacing == Spacing::Equal;
+    let equal = options.edges.is_none() && options.spacing == Spacing::Equal;
     (equal && edges.len() - 1 > counted).then(|| equal_edges(edges[edges.len() - 1], counted.max(1)))
 }
 
@@ -79,7 +121,29 @@ fn fewer_bins(edges: &[f64], profiles: &MeasuredProfiles, choices: &Choices) -> 
 struct Found {
     sum: Unfolding,
     by_type: Vec<Unfolding>,
-    rows: DensityRows,
+    by_category: Option<CategoryDensities>,
+}
+
+impl Found {
+    /// densities.csv: all together, each type, each category.
+    fn rows(&self) -> DensityRows {
+        let mut rows = DensityRows::default();
+        rows.unfolding(&self.sum, None, None);
+        for (kind, part) in self.by_type.iter().enumerate() {
+            rows.unfolding(part, Some(kind), None);
+        }
+        if let Some(CategoryDensities {
+            categories,
+            kinds,
+            found,
+        }) = &self.by_category
+        {
+            for ((category, kind), part) in categories.iter().zip(kinds).zip(&found.types) {
+                rows.unfolding(part, *kind, Some(usize::from(*category)));
+            }
+        }
+        rows
+    }
 }
 
 impl Unfold {
@@ -89,8 +153,12 @@ impl Unfold {
         }
         let choices = &self.choices;
         let scale = everywhere.scale;
-        let options = choices.unfold_options(scale, everywhere.seed)?;
+        let options = choices.density_options(scale, everywhere.seed, &DEFAULTS);
         let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
+        if let Some(rule) = self.edge_rule {
+            // Boxes and window in the unit of the table: weights have none.
+            rule.weigh(&mut profiles, self.window.map(|Window(sides)| sides))?;
+        }
         profiles.iter_mut().for_each(|profile| profile.size *= scale);
         let mut types = choices.types()?;
         let area = self.area * scale * scale;
@@ -98,22 +166,23 @@ impl Unfold {
             sizes: profiles.iter().map(|profile| profile.size).collect(),
             weights: profiles.iter().map(|profile| profile.weight).collect(),
             categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
-            slices: slices(&profiles),
+            slices: all(&profiles, |profile| profile.slice),
+            types: all(&profiles, |profile| profile.kind),
             area,
             min_size: 0.0,
         };
         let (largest, likely_size) =
-            largest_particle(&measured, &types, choices.largest(scale), &options).at(&self.profiles)?;
-        let edges = choices.size_edges(&profiles, largest, scale)?;
-        let fewer = fewer_bins(&edges, &measured, choices);
+            largest_particle(&measured, &types, options.max_size, &options.unfold).at(&self.profiles)?;
+        let edges = size_edges(&measured, largest, &options).at(&self.profiles)?;
+        let fewer = fewer_bins(&edges, &measured, &options);
         let edges = fewer.clone().unwrap_or(edges);
         let (angle, likely_angle) =
-            capping_angle(&measured, &types, choices.capping(), &edges, &options).at(&self.profiles)?;
+            capping_angle(&measured, &types, options.capping, &edges, &options.unfold).at(&self.profiles)?;
         if self.unknown_fractions && types.types().len() < 2 {
             return Err(Failure::usage("--unknown-fractions needs two or more --shape"));
         }
         let fractions = if self.unknown_fractions {
-            let found = type_shares(&measured, &types, &edges, &options).at(&self.profiles)?;
+            let found = type_shares(&measured, &types, &edges, &options.unfold).at(&self.profiles)?;
             types = types.with_shares(&found.fractions).or_fail()?;
             Some(found)
         } else {
@@ -122,23 +191,38 @@ impl Unfold {
         let step = Step::begin("unfolding", everywhere.quiet);
         let progress = |done: f64| step.at(done);
 
-        let labelled = types.types().len() > 1 && profiles.iter().all(|profile| profile.kind.is_some());
-        let found = if labelled {
-            self.labelled(&profiles, &types, &edges, area, &options, &progress)?
+        let options = DensityOptions {
+            edges: Some(edges.clone()),
+            capping: Capping::Angle(angle),
+            ..options
+        };
+        let kinds = types.types().len();
+        if let Some(kind) = profiles.iter().find_map(|of| of.kind.filter(|kind| *kind >= kinds)) {
+            return Err(Failure::run(format!(
+                "{}: a profile has type {kind}, but there are {kinds} --shape (types are numbered from 0)",
+                self.profiles.display(),
+            )));
+        }
+        let by_category = category_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
+        let found = if kinds > 1 && !measured.types.is_empty() {
+            let found = type_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
+            Found {
+                sum: summed(&found),
+                by_type: found.types,
+                by_category,
+            }
         } else {
-            let options = DensityOptions {
-                edges: Some(edges.clone()),
-                sizes: choices.sizes(),
-                capping: Capping::Angle(angle),
-                unfold: options,
-                ..DensityOptions::default()
-            };
-            self.together(&profiles, &measured, &types, &options, &progress)?
+            let found = particle_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
+            Found {
+                sum: found.all,
+                by_type: Vec::new(),
+                by_category,
+            }
         };
         drop(step);
         go_on()?;
         if let Some(output) = &self.output {
-            found.rows.write(output).at(output)?;
+            found.rows().write(output).at(output)?;
         }
         let mut answer = self.answer(&found, &profiles);
         if fewer.is_some() {
@@ -187,122 +271,12 @@ impl Unfold {
         Ok(answer)
     }
 
-    /// All types share one size distribution: eqs. (10)-(12).
-    fn together(
-        &self,
-        profiles: &[TableProfile],
-        measured: &MeasuredProfiles,
-        types: &ParticleTypes,
-        options: &DensityOptions,
-        progress: unfold::Progress<'_>,
-    ) -> Result<Found, Failure> {
-        if let Some(profile) = profiles
-            .iter()
-            .find(|profile| profile.kind.is_some_and(|kind| kind >= types.types().len()))
-        {
-            return Err(self.no_such_type(profile, types));
-        }
-        let densities = particle_densities(measured, types, options, progress).at(&self.profiles)?;
-        let mut rows = DensityRows::default();
-        rows.unfolding(&densities.all, None, None);
-        if densities.by_category.len() > 1 {
-            for (category, density) in densities.by_category.iter().enumerate() {
-                rows.densities(&densities.all.edges, density, None, Some(category));
-            }
-        }
-        Ok(Found {
-            sum: densities.all,
-            by_type: Vec::new(),
-            rows,
-        })
-    }
-
-    /// Each type has its own profiles: eq. (9).
-    fn labelled(
-        &self,
-        profiles: &[TableProfile],
-        types: &ParticleTypes,
-        edges: &[f64],
-        area: f64,
-        options: &UnfoldOptions,
-        progress: unfold::Progress<'_>,
-    ) -> Result<Found, Failure> {
-        let threshold = options.min_size.unwrap_or(0.0);
-        let bins = types.unfolding_bins(edges, threshold, options.method, self.choices.sizes());
-        let mut parts = Vec::new();
-        for (kind, of) in types.types().iter().enumerate() {
-            let own = || profiles.iter().filter(|profile| profile.kind == Some(kind));
-            let sizes: Vec<f64> = own().map(|profile| profile.size).collect();
-            let weights: Vec<f64> = own().map(|profile| profile.weight).collect();
-            if weights.iter().sum::<f64>() <= 0.0 {
-                return Err(Failure::run(format!(
-                    "{}: no profile of type {kind} ({}) counts; leave that --shape out",
-                    self.profiles.display(),
-                    of.name
-                )));
-            }
-            let own_slices: Vec<usize> = own().filter_map(|profile| profile.slice).collect();
-            let counts = if own_slices.len() == sizes.len() {
-                ProfileCounts::from_slices(&sizes, Some(&weights), &own_slices, &bins.profile_edges, area)
-            } else {
-                ProfileCounts::from_sizes(&sizes, Some(&weights), &bins.profile_edges, area)
-            };
-            let kernel = of
-                .kernel(&bins.profile_edges, &bins.size_edges, self.choices.sizes())
-                .or_fail()?;
-            parts.push((counts.at(&self.profiles)?, kernel.reported_in(edges).or_fail()?));
-        }
-        if let Some(profile) = profiles
-            .iter()
-            .find(|profile| profile.kind.is_some_and(|kind| kind >= parts.len()))
-        {
-            return Err(self.no_such_type(profile, types));
-        }
-        let found = unfold_types_with_progress(&parts, options, progress).at(&self.profiles)?;
-        let mut sum = found.types[0].clone();
-        sum.number_density = found.number_density;
-        sum.intervals = found.intervals;
-        (sum.total, sum.mean_size, sum.volume_fraction) = (found.total, found.mean_size, found.volume_fraction);
-        (sum.surface_density, sum.distribution) = (found.surface_density, found.distribution);
-        (sum.observed, sum.refolded) = (found.observed, found.refolded);
-        for part in &found.types[1..] {
-            sum.profiles += part.profiles;
-            for (sum, part) in [
-                (&mut sum.profiles_per_area, part.profiles_per_area),
-                (&mut sum.area_fraction, part.area_fraction),
-            ] {
-                sum.observed += part.observed;
-                sum.expected += part.expected;
-            }
-            sum.deviance += part.deviance;
-            sum.degrees_of_freedom += part.degrees_of_freedom;
-            sum.condition_number = sum.condition_number.max(part.condition_number);
-            sum.clamped_bins.extend(&part.clamped_bins);
-            sum.findings.extend(part.findings.iter().cloned());
-        }
-        let mut rows = DensityRows::default();
-        rows.unfolding(&sum, None, None);
-        for (kind, part) in found.types.iter().enumerate() {
-            rows.unfolding(part, Some(kind), None);
-        }
-        Ok(Found {
-            sum,
-            by_type: found.types,
-            rows,
-        })
-    }
-
-    fn no_such_type(&self, profile: &TableProfile, types: &ParticleTypes) -> Failure {
-        Failure::run(format!(
-            "{}: a profile has type {}, but there are {} --shape (types are numbered from 0)",
-            self.profiles.display(),
-            profile.kind.unwrap_or(0),
-            types.types().len()
-        ))
-    }
-
     fn answer(&self, found: &Found, profiles: &[TableProfile]) -> Answer {
-        let Found { sum, by_type, .. } = found;
+        let Found {
+            sum,
+            by_type,
+            by_category,
+        } = found;
         let mut answer = Answer::new("unfold");
         for (name, value) in figures(sum, self.choices.kernel_name()) {
             answer.field(name, value);
@@ -315,8 +289,17 @@ impl Unfold {
                 .collect();
             answer.field("types", types);
         }
+        if let Some(of) = by_category {
+            answer.field("categories", categories(of));
+            answer.field("categories_sum", group_figures(&Group::sum(&of.found)));
+        }
         for finding in &sum.findings {
             answer.warn(Warning::new(finding.code(), finding.to_string()));
+        }
+        for (kind, part) in by_type.iter().enumerate() {
+            for finding in &part.findings {
+                answer.warn(Warning::new(finding.code(), format!("type {kind}: {finding}")));
+            }
         }
         let unlabelled = profiles.iter().filter(|profile| profile.kind.is_none()).count();
         if unlabelled > 0 && unlabelled < profiles.len() {

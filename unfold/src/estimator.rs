@@ -23,6 +23,8 @@ pub(crate) struct Fit {
     pub(crate) parameters: f64,
     /// ln evidence of the sparse estimate less that of the smooth one, where both were asked.
     pub(crate) for_sparse: Option<f64>,
+    /// ln evidence, where there is one; differences count.
+    pub(crate) evidence: Option<f64>,
     /// What is fitted to counts drawn again.
     pub(crate) again: Refit,
 }
@@ -105,6 +107,7 @@ fn smooth_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
         penalty: Some(found.penalty),
         parameters: found.effective_parameters,
         for_sparse: None,
+        evidence: Some(found.evidence),
         again: Refit::Smooth(rougher, theta),
     };
     (fit, found.evidence)
@@ -122,6 +125,7 @@ fn sparse_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
         penalty: None,
         parameters: found.kept as f64,
         for_sparse: None,
+        evidence: Some(found.evidence),
         again: Refit::Likelihood,
     };
     (fit, found.evidence)
@@ -162,6 +166,7 @@ fn plain_fit(problem: &Problem, counts: &[f64], method: Method, options: &Unfold
         penalty: None,
         parameters: columns as f64,
         for_sparse: None,
+        evidence: None,
         again: Refit::Same(method),
     })
 }

@@ -194,6 +194,8 @@ pub struct Unfolding {
     pub method: Method,
     /// ln evidence of the sparse estimate less that of the smooth one, if [`Method::Auto`] chose: sparse from 3 on.
     pub evidence_for_sparse: Option<f64>,
+    /// ln evidence of the estimate: only differences count, between kernels on the same profile bins.
+    pub evidence: Option<f64>,
     /// The penalty of a smooth estimate.
     pub penalty: Option<PenaltyUsed>,
     /// Size bins whose negative density was set to zero, from 0.
@@ -435,6 +437,7 @@ fn result(
         threshold: problem.threshold,
         method: fit.method,
         evidence_for_sparse: fit.for_sparse,
+        evidence: fit.evidence,
         penalty: fit.penalty.map(|penalty| PenaltyUsed {
             order: penalty.order,
             weight: penalty.weight,

@@ -41,6 +41,12 @@ enum Task {
         #[arg(long)]
         only: Option<String>,
     },
+    /// Prints the part of docs/acceptance.md about the CT volume of sand
+    Sand {
+        /// Folder that holds volumes/
+        #[arg(long)]
+        data: PathBuf,
+    },
     /// Draws the paper's figures into docs/figures
     Figures {
         /// Only those whose name holds this
@@ -74,6 +80,10 @@ fn main() -> Result<()> {
             if wanted("noise") {
                 particle_noise::run(&data.join("images"), &page)?;
             }
+            Ok(())
+        }
+        Task::Sand { data } => {
+            println!("{}", sand::compare(&data)?);
             Ok(())
         }
         Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),

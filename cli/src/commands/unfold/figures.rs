@@ -45,6 +45,7 @@ pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
         ("penalty", json!(found.penalty.map(|penalty| penalty.weight))),
         ("penalty_order", json!(found.penalty.map(|penalty| penalty.order))),
         ("penalty_bend", json!(found.penalty.and_then(|penalty| penalty.bend))),
+        ("evidence", json!(found.evidence)),
         ("evidence_for_sparse", json!(found.evidence_for_sparse)),
         ("method", json!(found.method.name())),
         ("kernel", json!(kernel)),

@@ -22,7 +22,7 @@ use crate::numbers::{percent, significant};
 use crate::outputs::check_file;
 use crate::profile_table::{TableProfile, read_profiles};
 use crate::progress::{Step, go_on};
-use crate::values::{Window, positive};
+use crate::values::{Window, count, positive};
 use crate::warnings::Warning;
 
 pub use choices::{Choices, Defaults, types};
@@ -63,6 +63,12 @@ pub struct Unfold {
     pub area: f64,
     #[command(flatten)]
     pub choices: Choices,
+    /// em stops when no densities could have a log-likelihood higher by more than this [default: 0.01]
+    #[arg(long, value_name = "T", value_parser = positive, help_heading = "Unfolding")]
+    pub tolerance: Option<f64>,
+    /// em and ems stop after so many steps in any case [default: 100000]
+    #[arg(long, value_name = "N", value_parser = count, help_heading = "Unfolding")]
+    pub iterations: Option<usize>,
     /// Weigh profiles at the edges by this rule instead of the column `weight`; needs the columns left, top, right, bottom and --window (all and inside: touches_edge will do)
     #[arg(long, value_enum, help_heading = "Unfolding")]
     pub edge_rule: Option<EdgeRule>,
@@ -153,7 +159,10 @@ impl Unfold {
         }
         let choices = &self.choices;
         let scale = everywhere.scale;
-        let options = choices.density_options(scale, everywhere.seed, &DEFAULTS);
+        let mut options = choices.density_options(scale, everywhere.seed, &DEFAULTS);
+        let of = &mut options.unfold;
+        of.tolerance = self.tolerance.unwrap_or(of.tolerance);
+        of.max_iterations = self.iterations.unwrap_or(of.max_iterations);
         let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
         if let Some(rule) = self.edge_rule {
             // Boxes and window in the unit of the table: weights have none.

@@ -22,8 +22,8 @@ pub enum Finding {
     FewProfilesInBin {
         /// Profile bins merged to the size bins, from 0.
         bins: Vec<usize>,
-        /// The largest number of equal bins with five or more profiles in every bin that has any.
-        enough: usize,
+        /// The largest number of equal bins with five or more profiles in every bin that has any; `None` if there are fewer than five in all.
+        enough: Option<usize>,
     },
     /// Densities of neighbouring bins swing up and down threefold, three times in a row or more (`oscillating-bins`).
     OscillatingBins {
@@ -99,11 +99,18 @@ impl fmt::Display for Finding {
                 100.0 * share,
                 fewer(*enough)
             ),
-            Self::FewProfilesInBin { bins, enough } => write!(
-                f,
-                "fewer than five profiles in bin {}: its density is uncertain; {enough} equal bins would hold five or more each",
-                numbered(bins)
-            ),
+            Self::FewProfilesInBin { bins, enough } => {
+                write!(
+                    f,
+                    "fewer than five profiles in bin {}: its density is uncertain; ",
+                    numbered(bins)
+                )?;
+                match enough {
+                    None => f.write_str("there are fewer than five in all, too few for any bin"),
+                    Some(1) => f.write_str("1 bin would hold five or more"),
+                    Some(enough) => write!(f, "{enough} equal bins would hold five or more each"),
+                }
+            }
             Self::OscillatingBins { from, to, enough } => write!(
                 f,
                 "densities swing up and down from bin {} to bin {}: noise of the counts, magnified; use {} or the method auto",
@@ -209,10 +216,10 @@ pub(crate) fn few_profiles(edges: &[f64], cumulative: impl Fn(f64) -> f64) -> Op
         return None;
     }
     let largest = edges[edges.len() - 1];
-    let enough = (1..edges.len() - 1)
+    // Bins of other widths may have a cure in as many equal ones, or more.
+    let enough = (1..edges.len())
         .rev()
-        .find(|&n| (0..n).all(|k| !is_few(largest * k as f64 / n as f64, largest * (k + 1) as f64 / n as f64)))
-        .unwrap_or(1);
+        .find(|&n| (0..n).all(|k| !is_few(largest * k as f64 / n as f64, largest * (k + 1) as f64 / n as f64)));
     Some(Finding::FewProfilesInBin { bins, enough })
 }
 
@@ -274,7 +281,7 @@ mod tests {
             few_profiles(&[0.0, 1.0, 2.0, 3.0], cumulative),
             Some(Finding::FewProfilesInBin {
                 bins: vec![0],
-                enough: 2
+                enough: Some(2)
             })
         );
         assert_eq!(few_profiles(&[1.0, 2.0, 3.0], cumulative), None);

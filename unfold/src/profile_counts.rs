@@ -210,18 +210,18 @@ impl ProfileCounts {
             });
         }
         // Numbers need not be dense: slices that hold nothing at all beyond a million are not counted one by one.
-        let mut numbers: Vec<usize> = slices.to_vec();
-        numbers.sort_unstable();
-        numbers.dedup();
-        let dense = numbers.last().is_some_and(|&last| last < MOST_SLICES);
-        let place = |slice: usize| {
-            if dense {
-                slice
-            } else {
-                numbers.partition_point(|&n| n < slice)
-            }
+        let most = slices.iter().max().map_or(0, |&last| last);
+        let numbers: Option<Vec<usize>> = (most >= MOST_SLICES).then(|| {
+            let mut numbers = slices.to_vec();
+            numbers.sort_unstable();
+            numbers.dedup();
+            numbers
+        });
+        let place = |slice: usize| match &numbers {
+            None => slice,
+            Some(numbers) => numbers.partition_point(|&n| n < slice),
         };
-        let count = numbers.last().map_or(0, |&last| place(last) + 1);
+        let count = if slices.is_empty() { 0 } else { place(most) + 1 };
         let mut by_slice = vec![vec![0.0; edges.len() - 1]; count];
         for (index, (&size, &slice)) in sizes.iter().zip(slices).enumerate() {
             let below = edges.partition_point(|&edge| edge < size);

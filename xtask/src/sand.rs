@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, particle_densities};
+use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
 use stereology::shape::Body;
 use stereology::unfold::{
     Bootstrap, BoundingBox, EdgeRule, Estimate, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel,
@@ -22,7 +22,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 /// Slices are so many voxels apart.
 const APART: usize = 10;
 /// Profiles below these are left out, voxels: what is smaller than eight voxels is noise of the labels; and below seven across an error of the label's
-/// border by half a voxel changes the area by more than a quarter. No grain is as small as that.
+/// border by half a voxel changes the area by more than a quarter. Hardly any grain is as small as that.
 const LEAST_SIZES: [f64; 2] = [3.19, 7.0];
 
 /// A connected piece of a label on a slice.
@@ -43,7 +43,7 @@ struct GrainLaw {
     /// Mean volume over the cube of the size.
     unit_volume: f64,
     /// Sizes of the grains, rising.
-    smallest: Vec<f64>,
+    sizes: Vec<f64>,
 }
 
 /// Labels, x fastest.
@@ -192,10 +192,9 @@ impl Labels {
             law.relative.extend(sizes[of].iter().map(|size| size / largest));
             law.unit_volume += share * volumes[of] / largest.powi(3);
             law.caliper += share * sizes[of].len() as f64 / 3.0 / largest;
-            law.smallest.push(largest);
+            law.sizes.push(largest);
         }
         law.relative.sort_by(f64::total_cmp);
-        law.smallest.sort_by(f64::total_cmp);
         law
     }
 
@@ -278,11 +277,9 @@ pub fn compare(data: &Path) -> Result<String> {
     let [wide_b, wide_c] = with_width([b, c], law.caliper / per_volume)?;
     let mut text = format!(
         "\nSand, a real CT volume: {} profiles on slices {APART} voxels apart along three axes, Miles-Lantuéjoul weights, against the labels of the volume (sizes as equal-volume \
-         diameters; 90 % intervals by drawing slices; the smallest of {} whole grains is {:.1} voxels):\n\n| shape | profiles above, voxels | density / true | mean size / true | \
-         volume fraction / true | ln evidence | method |\n|---|---|---|---|---|---|---|\n",
+         diameters; 90 % intervals by drawing slices; ln evidence compares spheres and the grains' own law, on the same bins):\n\n| shape | profiles above, voxels | whole grains below that | density / true | mean size / true | \
+         volume fraction / true | ln evidence | method |\n|---|---|---|---|---|---|---|---|\n",
         profiles.weights.iter().filter(|weight| **weight > 0.0).count(),
-        law.smallest.len(),
-        law.smallest[0],
     );
     let bootstrap = Bootstrap {
         resampling: stereology::unfold::Resampling::Slices,
@@ -317,7 +314,10 @@ pub fn compare(data: &Path) -> Result<String> {
             let ratio = (6.0 * unit_volume / PI).cbrt();
             writeln!(
                 text,
-                "| {name} | {least:.1} | {} | {} | {} | {:.1} | {} |",
+                "| {name} | {:.1} | {} of {} | {} | {} | {} | {:.1} | {} |",
+                found.threshold,
+                law.sizes.iter().filter(|size| **size < found.threshold).count(),
+                law.sizes.len(),
                 over(found.total, 1.0 / number),
                 over(found.mean_size, ratio / mean),
                 over(found.volume_fraction, 1.0 / fraction),
@@ -325,6 +325,7 @@ pub fn compare(data: &Path) -> Result<String> {
                 found.method.name()
             )
         };
+        let mut threshold = least;
         for (name, shape) in &shapes {
             let types = ParticleTypes::parse(&[shape])?;
             let options = DensityOptions {
@@ -332,11 +333,12 @@ pub fn compare(data: &Path) -> Result<String> {
                 ..DensityOptions::default()
             };
             let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(()))?.all;
+            threshold = found.threshold;
             row(name, &found, types.unit_bodies()[0].volume())?;
         }
         row(
             "the grains' own law of sections",
-            &by_law(&profiles, &law, unfolding)?,
+            &by_law(&profiles, &law, unfolding.with_min_size(threshold))?,
             law.unit_volume,
         )?;
     }
@@ -347,7 +349,9 @@ pub fn compare(data: &Path) -> Result<String> {
 fn by_law(profiles: &MeasuredProfiles, law: &GrainLaw, options: UnfoldOptions) -> Result<Unfolding> {
     let largest = profiles.sizes.iter().copied().fold(0.0, f64::max);
     let edges = equal_edges(largest, DensityOptions::default().bins);
-    let bins = UnfoldingBins::new(&edges, profiles.min_size, options.method, Sizes::Integrated);
+    let threshold = options.min_size.unwrap_or(0.0);
+    let spheres = ParticleTypes::parse(&["sphere"])?;
+    let bins = spheres.unfolding_bins(&edges, threshold, options.method, Sizes::Integrated);
     let up_to = |x: f64| law.relative.partition_point(|of| *of <= x) as f64 / law.relative.len() as f64;
     let sizes = SizeBins::integrated(&bins.size_edges)?.reported_in(&edges)?;
     let kernel = capped_kernel(&up_to, law.caliper, 0.0, &bins.profile_edges, sizes, law.unit_volume)?;
@@ -358,5 +362,5 @@ fn by_law(profiles: &MeasuredProfiles, law: &GrainLaw, options: UnfoldOptions) -
         &bins.profile_edges,
         profiles.area,
     )?;
-    Ok(unfold(&counts, &kernel, &options.with_min_size(profiles.min_size))?)
+    Ok(unfold(&counts, &kernel, &options)?)
 }

@@ -2,7 +2,7 @@
 
 use crate::camera::Camera;
 use crate::mesh_picture::{RenderError, RenderOptions, render_mesh};
-use crate::tile::Colour;
+use crate::paths::Colour;
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
 use stereology_shape::TriangleMesh;

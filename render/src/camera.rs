@@ -23,6 +23,25 @@ pub struct Camera {
     pub up: UnitVector3<f64>,
 }
 
+impl Camera {
+    /// From the object towards the camera, and the level directions to where it would stand at azimuth 0 and at 90.
+    pub(crate) fn out(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
+        let (azimuth, elevation) = (self.azimuth.to_radians(), self.elevation.to_radians());
+        let front = if self.up.y.abs() > 0.9 {
+            Vector3::z()
+        } else {
+            -Vector3::y()
+        };
+        let front = (front - self.up.dot(&front) * self.up.into_inner()).normalize();
+        let side = self.up.cross(&front);
+        let level = azimuth.cos() * front + azimuth.sin() * side;
+        (
+            elevation.cos() * level + elevation.sin() * self.up.into_inner(),
+            [front, side],
+        )
+    }
+}
+
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -53,17 +72,7 @@ const FILL: f64 = 0.84;
 impl View {
     /// Puts the camera so that all points are seen; they must not be empty.
     pub(crate) fn new(camera: &Camera, points: &[Point3<f64>], [width, height]: [u32; 2]) -> Self {
-        let (azimuth, elevation) = (camera.azimuth.to_radians(), camera.elevation.to_radians());
-        // The direction to the camera at azimuth 0, and the one at 90 degrees.
-        let front = if camera.up.y.abs() > 0.9 {
-            Vector3::z()
-        } else {
-            -Vector3::y()
-        };
-        let front = (front - camera.up.dot(&front) * camera.up.into_inner()).normalize();
-        let side = camera.up.cross(&front);
-        let out =
-            elevation.cos() * (azimuth.cos() * front + azimuth.sin() * side) + elevation.sin() * camera.up.into_inner();
+        let (out, _) = camera.out();
         let forward = -out;
         let right = forward.cross(&camera.up).normalize();
         let up = right.cross(&forward);

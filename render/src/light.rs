@@ -38,8 +38,6 @@ pub(crate) struct Studio {
 
 /// Radius of the key light's disc as seen from the scene, as a tangent: a large softbox.
 const KEY_RADIUS: f64 = 0.16;
-/// What hidden directions still give: light thrown to and fro in hollows.
-const HOLLOW: f64 = 0.13;
 
 impl Studio {
     /// With the key light behind the viewer's left shoulder. `forward` is where the camera looks.
@@ -75,9 +73,19 @@ impl Studio {
         }
     }
 
-    /// Radiance from a direction where something is in the way.
-    pub(crate) fn hollow(&self) -> f64 {
-        HOLLOW
+    /// Share of light that the ground throws back, and so its radiance where nothing hides it.
+    pub(crate) fn ground(&self) -> f64 {
+        self.ground
+    }
+
+    /// Whether a direction is towards the disc of the key light.
+    pub(crate) fn is_in_key(&self, direction: &Vector3<f64>) -> bool {
+        direction.dot(&self.key) > (1.0 + KEY_RADIUS * KEY_RADIUS).sqrt().recip()
+    }
+
+    /// Radiance of that disc: over it, L cos θ dω / π makes up the key's strength.
+    pub(crate) fn key_radiance(&self) -> f64 {
+        self.key_strength * (1.0 + KEY_RADIUS * KEY_RADIUS) / (KEY_RADIUS * KEY_RADIUS)
     }
 
     /// Direction to a point of the key light, of a point of the unit square.

@@ -1,14 +1,12 @@
-//! The mesh as rays meet it: bounding volumes, hits, smooth normals.
+//! The mesh as rays meet it: hits, smooth normals.
 
-use bvh::aabb::{Aabb, Bounded};
-use bvh::bounding_hierarchy::BHShape;
-use bvh::bvh::{Bvh, BvhNode};
+use crate::hierarchy::Hierarchy;
 use nalgebra::{Point3, Vector3};
 use stereology_shape::{TriangleMesh, corner_normals};
 
 /// A triangle mesh with what rays ask of it.
 pub(crate) struct Scene {
-    bvh: Bvh<f64, 3>,
+    hierarchy: Hierarchy,
     corners: Vec<[Point3<f64>; 3]>,
     /// Normals at the corners, smooth where the faces nearly agree.
     normals: Vec<[Vector3<f64>; 3]>,
@@ -34,27 +32,6 @@ pub(crate) struct Surface {
     pub(crate) start: Point3<f64>,
 }
 
-struct Facet {
-    bounds: Aabb<f64, 3>,
-    node: usize,
-}
-
-impl Bounded<f64, 3> for Facet {
-    fn aabb(&self) -> Aabb<f64, 3> {
-        self.bounds
-    }
-}
-
-impl BHShape<f64, 3> for Facet {
-    fn set_bh_node_index(&mut self, index: usize) {
-        self.node = index;
-    }
-
-    fn bh_node_index(&self) -> usize {
-        self.node
-    }
-}
-
 impl Scene {
     /// Of triangles whose indices and coordinates have been checked; at least one.
     pub(crate) fn new(mesh: &TriangleMesh) -> Self {
@@ -63,26 +40,23 @@ impl Scene {
             .iter()
             .map(|t| t.map(|i| mesh.vertices[i as usize]))
             .collect();
-        let mut facets: Vec<Facet> = corners
-            .iter()
-            .map(|[a, b, c]| Facet {
-                bounds: Aabb::with_bounds(a.inf(b).inf(c), a.sup(b).sup(c)),
-                node: 0,
-            })
-            .collect();
-        let bvh = Bvh::build(&mut facets);
+        let hierarchy = Hierarchy::new(&corners);
         let normals = corner_normals(mesh);
-        Self { bvh, corners, normals }
+        Self {
+            hierarchy,
+            corners,
+            normals,
+        }
     }
 
     /// The first hit nearer than `far`.
     pub(crate) fn first_hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>, far: f64) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
-        self.visit(origin, direction, far, |facet, far| {
-            let hit = self.meet(facet, origin, direction).filter(|hit| hit.distance < far);
-            if let Some(hit) = hit {
+        let mut far = far;
+        self.hierarchy.visit(origin, direction, far, |facet| {
+            if let Some(hit) = self.meet(facet, origin, direction).filter(|hit| hit.distance < far) {
+                far = hit.distance;
                 nearest = Some(hit);
-                return Some(hit.distance);
             }
             Some(far)
         });
@@ -92,50 +66,11 @@ impl Scene {
     /// Whether anything is in the way.
     pub(crate) fn is_hidden(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> bool {
         let mut hidden = false;
-        self.visit(origin, direction, f64::INFINITY, |facet, far| {
+        self.hierarchy.visit(origin, direction, f64::INFINITY, |facet| {
             hidden = self.meet(facet, origin, direction).is_some();
-            if hidden { None } else { Some(far) }
+            if hidden { None } else { Some(f64::INFINITY) }
         });
         hidden
-    }
-
-    /// Visits the facets whose boxes the ray meets, near boxes first; `visit` returns how far it still wants to look, or `None` to end.
-    fn visit(
-        &self,
-        origin: &Point3<f64>,
-        direction: &Vector3<f64>,
-        mut far: f64,
-        mut visit: impl FnMut(usize, f64) -> Option<f64>,
-    ) {
-        let inverse = direction.map(f64::recip);
-        let mut stack = Vec::with_capacity(64);
-        stack.push((0, 0.0));
-        while let Some((index, near)) = stack.pop() {
-            if near > far {
-                continue;
-            }
-            match &self.bvh.nodes[index] {
-                BvhNode::Leaf { shape_index, .. } => match visit(*shape_index, far) {
-                    Some(wanted) => far = wanted,
-                    None => return,
-                },
-                BvhNode::Node {
-                    child_l_index,
-                    child_l_aabb,
-                    child_r_index,
-                    child_r_aabb,
-                    ..
-                } => {
-                    let left = entry(child_l_aabb, origin, &inverse).map(|near| (*child_l_index, near));
-                    let right = entry(child_r_aabb, origin, &inverse).map(|near| (*child_r_index, near));
-                    let (first, second) = match (left, right) {
-                        (Some(l), Some(r)) if r.1 < l.1 => (Some(r), Some(l)),
-                        other => other,
-                    };
-                    stack.extend(second.into_iter().chain(first).filter(|(_, near)| *near <= far));
-                }
-            }
-        }
     }
 
     /// Where a ray meets a facet from either side (Möller and Trumbore 1997).
@@ -178,20 +113,6 @@ impl Scene {
             start: point + lift(0) + lift(1) + lift(2),
         }
     }
-}
-
-/// Where a ray enters a box, at 0 if it starts inside; `None` if it misses.
-fn entry(bounds: &Aabb<f64, 3>, origin: &Point3<f64>, inverse: &Vector3<f64>) -> Option<f64> {
-    let (mut near, mut far) = (0.0_f64, f64::INFINITY);
-    for k in 0..3 {
-        let low = (bounds.min[k] - origin[k]) * inverse[k];
-        let high = (bounds.max[k] - origin[k]) * inverse[k];
-        // f64::min and max pass over what is no number: a ray in the plane of a side counts as inside it.
-        near = near.max(low.min(high));
-        far = far.min(low.max(high));
-    }
-    // Rounding must not lose a box that is touched.
-    (near <= far * (1.0 + 1e-12)).then_some(near)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod bench_report;
 mod figures;
 mod label_scores;
 mod particle_noise;
+mod renderer_check;
 mod sample;
 mod sand;
 mod texture_table;
@@ -37,9 +38,12 @@ enum Task {
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
-        /// Only this part: photographs, textures or noise
+        /// Only this part: photographs, textures, noise or renderer
         #[arg(long)]
         only: Option<String>,
+        /// Python that has mitsuba, against which the renderer is held; without it that part is left out
+        #[arg(long)]
+        python: Option<PathBuf>,
     },
     /// Prints the part of docs/acceptance.md about the CT volume of sand
     Sand {
@@ -67,7 +71,12 @@ enum Task {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
-        Task::Acceptance { data, results, only } => {
+        Task::Acceptance {
+            data,
+            results,
+            only,
+            python,
+        } => {
             let wanted = |part: &str| only.as_deref().is_none_or(|only| only == part);
             if wanted("photographs") {
                 let program = root()?.join("target/release/stereology");
@@ -79,6 +88,9 @@ fn main() -> Result<()> {
             }
             if wanted("noise") {
                 particle_noise::run(&data.join("images"), &page)?;
+            }
+            if let Some(python) = python.filter(|_| wanted("renderer")) {
+                renderer_check::run(&python, &results.join("renderer"))?;
             }
             Ok(())
         }

@@ -1,0 +1,217 @@
+//! Boxes around boxes around triangles, four at a time, in single precision.
+//!
+//! The tree is that of the crate `bvh` (surface area heuristic); every second floor of it is taken out, so that a ray asks four boxes at once. Boxes are rounded outwards by more than a ray's own rounding, so none that is touched is lost;
+//! what is in them is tested by the caller in double precision.
+
+use bvh::aabb::{Aabb, Bounded};
+use bvh::bounding_hierarchy::BHShape;
+use bvh::bvh::{Bvh, BvhNode};
+use nalgebra::{Point3, Vector3};
+
+/// A box tree over triangles.
+pub(crate) struct Hierarchy {
+    nodes: Vec<Node>,
+    /// Places are measured from here, in this length, so that all lie in −1..1.
+    middle: Point3<f64>,
+    reach: f64,
+}
+
+/// Four boxes and what is in each.
+struct Node {
+    low: [[f32; 4]; 3],
+    high: [[f32; 4]; 3],
+    child: [u32; 4],
+}
+
+/// The child is a triangle, not a node.
+const TRIANGLE: u32 = 1 << 31;
+/// More than what a ray of length 4 loses to single precision.
+const MARGIN: f32 = 2e-6;
+
+struct Facet {
+    bounds: Aabb<f64, 3>,
+    node: usize,
+}
+
+impl Bounded<f64, 3> for Facet {
+    fn aabb(&self) -> Aabb<f64, 3> {
+        self.bounds
+    }
+}
+
+impl BHShape<f64, 3> for Facet {
+    fn set_bh_node_index(&mut self, index: usize) {
+        self.node = index;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
+
+impl Hierarchy {
+    /// Over at least one triangle, not all corners in one point.
+    pub(crate) fn new(corners: &[[Point3<f64>; 3]]) -> Self {
+        let mut facets: Vec<Facet> = corners
+            .iter()
+            .map(|[a, b, c]| Facet {
+                bounds: Aabb::with_bounds(a.inf(b).inf(c), a.sup(b).sup(c)),
+                node: 0,
+            })
+            .collect();
+        let (low, high) = facets
+            .iter()
+            .map(|facet| (facet.bounds.min, facet.bounds.max))
+            .fold((corners[0][0], corners[0][0]), |(low, high), (min, max)| {
+                (low.inf(&min), high.sup(&max))
+            });
+        let mut hierarchy = Self {
+            nodes: Vec::with_capacity(corners.len() / 2 + 1),
+            middle: nalgebra::center(&low, &high),
+            reach: 0.5 * (high - low).norm(),
+        };
+        let tree = Bvh::build(&mut facets);
+        hierarchy.take(&tree.nodes, &facets, 0);
+        hierarchy
+    }
+
+    /// Takes a node of the binary tree and its children's children; returns its number here.
+    #[allow(clippy::cast_possible_truncation, reason = "meshes have fewer than 2^31 triangles")]
+    fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize) -> u32 {
+        let mut below = vec![(root, facets_bounds(tree, facets, root))];
+        while below.len() < 4 {
+            // The largest box that can be opened is opened.
+            let opened = below
+                .iter()
+                .enumerate()
+                .filter(|(_, (index, _))| matches!(tree[*index], BvhNode::Node { .. }))
+                .max_by(|a, b| area(&a.1.1).total_cmp(&area(&b.1.1)).then(b.0.cmp(&a.0)))
+                .map(|(place, _)| place);
+            let Some(place) = opened else { break };
+            if let BvhNode::Node {
+                child_l_index,
+                child_l_aabb,
+                child_r_index,
+                child_r_aabb,
+                ..
+            } = &tree[below[place].0]
+            {
+                below[place] = (*child_l_index, *child_l_aabb);
+                below.push((*child_r_index, *child_r_aabb));
+            }
+        }
+        let number = self.nodes.len();
+        self.nodes.push(Node {
+            low: [[f32::INFINITY; 4]; 3],
+            high: [[f32::NEG_INFINITY; 4]; 3],
+            child: [0; 4],
+        });
+        for (k, (index, bounds)) in below.into_iter().enumerate() {
+            let child = match &tree[index] {
+                BvhNode::Leaf { shape_index, .. } => TRIANGLE | *shape_index as u32,
+                BvhNode::Node { .. } => self.take(tree, facets, index),
+            };
+            let [low, high] = [bounds.min, bounds.max].map(|p| ((p - self.middle) / self.reach).map(|x| x as f32));
+            let node = &mut self.nodes[number];
+            node.child[k] = child;
+            for axis in 0..3 {
+                node.low[axis][k] = low[axis] - MARGIN;
+                node.high[axis][k] = high[axis] + MARGIN;
+            }
+        }
+        number as u32
+    }
+
+    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "boxes have a margin for single precision"
+    )]
+    pub(crate) fn visit(
+        &self,
+        origin: &Point3<f64>,
+        direction: &Vector3<f64>,
+        far: f64,
+        mut visit: impl FnMut(usize) -> Option<f64>,
+    ) {
+        let offset = (origin - self.middle) / self.reach;
+        // From far away single precision sees nothing: begin where the ray is nearest to the ball around all.
+        let skipped = (-offset.dot(direction) - 1.5).max(0.0);
+        let start = (offset + skipped * direction).map(|x| x as f32);
+        let inverse = direction.map(|x| (x as f32).recip());
+        let limit = |far: f64| (far / self.reach - skipped) as f32 + 2.0 * MARGIN;
+        let mut far = limit(far);
+        let mut stack = Vec::with_capacity(64);
+        stack.push((0_u32, 0.0_f32));
+        while let Some((child, near)) = stack.pop() {
+            if near > far {
+                continue;
+            }
+            if child & TRIANGLE != 0 {
+                match visit((child & !TRIANGLE) as usize) {
+                    Some(wanted) => far = limit(wanted),
+                    None => return,
+                }
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let entries = node.entries(&start, &inverse, far);
+            let first = stack.len();
+            for (k, &entry) in entries.iter().enumerate() {
+                if entry < f32::INFINITY {
+                    // Farthest at the bottom: inserted in order.
+                    let mut place = stack.len();
+                    stack.push((node.child[k], entry));
+                    while place > first && stack[place - 1].1 < entry {
+                        stack.swap(place - 1, place);
+                        place -= 1;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Node {
+    /// Where a ray enters each of the boxes before `far`; infinite where it does not.
+    fn entries(&self, start: &Vector3<f32>, inverse: &Vector3<f32>, far: f32) -> [f32; 4] {
+        let (mut near, mut end) = ([0.0_f32; 4], [far; 4]);
+        for axis in 0..3 {
+            let (from, by) = (start[axis], inverse[axis]);
+            let (first, last) = if by >= 0.0 {
+                (&self.low[axis], &self.high[axis])
+            } else {
+                (&self.high[axis], &self.low[axis])
+            };
+            for k in 0..4 {
+                // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
+                let (enter, leave) = ((first[k] - from) * by, (last[k] - from) * by);
+                near[k] = if enter > near[k] { enter } else { near[k] };
+                end[k] = if leave < end[k] { leave } else { end[k] };
+            }
+        }
+        let mut entries = [f32::INFINITY; 4];
+        for k in 0..4 {
+            if near[k] <= end[k] {
+                entries[k] = near[k];
+            }
+        }
+        entries
+    }
+}
+
+fn facets_bounds(tree: &[BvhNode<f64, 3>], facets: &[Facet], index: usize) -> Aabb<f64, 3> {
+    match &tree[index] {
+        BvhNode::Leaf { shape_index, .. } => facets[*shape_index].bounds,
+        BvhNode::Node {
+            child_l_aabb,
+            child_r_aabb,
+            ..
+        } => child_l_aabb.join(child_r_aabb),
+    }
+}
+
+fn area(bounds: &Aabb<f64, 3>) -> f64 {
+    let d = bounds.max - bounds.min;
+    d.x * d.y + d.y * d.z + d.z * d.x
+}

@@ -1,0 +1,247 @@
+//! Light followed backwards: what falls on a surface from the key light, the sky, and other surfaces in turn.
+
+#![allow(clippy::cast_possible_truncation, reason = "light is f32 where it is seen")]
+
+use crate::light::{Studio, about, linear};
+use crate::scene::{Scene, Surface};
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+pub(crate) type Colour<'a> = &'a (dyn Fn(&Point3<f64>) -> [f32; 3] + Sync);
+
+/// Linear light of three primaries.
+pub(crate) type Rgb = Vector3<f32>;
+
+/// A ray of light starts this share of the scene's size above the surface.
+const LIFT: f64 = 1e-6;
+/// The ground is seen, and throws shadows and light, within this many sizes of the object.
+pub(crate) const GROUND_REACH: f64 = 4.0;
+/// Light goes on from surface to surface with at most this chance, so every path ends.
+const MOST_LIVELY: f32 = 0.95;
+
+/// What light meets.
+pub(crate) struct World<'a> {
+    pub(crate) scene: Scene,
+    pub(crate) studio: Studio,
+    pub(crate) colour: Colour<'a>,
+    /// Height of the ground along `up`, if there is one.
+    pub(crate) ground: Option<f64>,
+    pub(crate) up: UnitVector3<f64>,
+    /// Largest extent of the object.
+    pub(crate) extent: f64,
+    pub(crate) middle: Point3<f64>,
+    pub(crate) gloss: f64,
+}
+
+/// What a ray meets.
+pub(crate) enum Met {
+    Sky,
+    Ground(Point3<f64>),
+    Object(Surface),
+}
+
+impl World<'_> {
+    /// The first thing that a ray meets.
+    pub(crate) fn meet(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Met {
+        let ground = self.ground.and_then(|height| {
+            let distance = (height - from.coords.dot(&self.up)) / direction.dot(&self.up);
+            (distance > 0.0).then_some(distance)
+        });
+        if let Some(hit) = self.scene.first_hit(from, direction, ground.unwrap_or(f64::INFINITY)) {
+            return Met::Object(self.scene.surface(&hit, direction));
+        }
+        ground
+            .map(|distance| from + distance * direction)
+            .filter(|point| (point - self.middle).norm() < GROUND_REACH * self.extent)
+            .map_or(Met::Sky, Met::Ground)
+    }
+
+    /// Where light that leaves or reaches a point begins.
+    pub(crate) fn above(&self, start: &Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
+        start + LIFT * self.extent * normal
+    }
+
+    /// Linear colour of the object, at most white.
+    pub(crate) fn colour_at(&self, point: &Point3<f64>) -> Rgb {
+        Rgb::from((self.colour)(point).map(|encoded| linear(encoded).min(1.0)))
+    }
+
+    /// Light on a surface: of the key in one direction, and from the directions of `sky` about the normal. A face that looks up and is not hidden gets 1 on average.
+    pub(crate) fn light_on(
+        &self,
+        start: &Point3<f64>,
+        normal: &Vector3<f64>,
+        key: [f64; 2],
+        sky: impl ExactSizeIterator<Item = [f64; 2]>,
+        chance: &mut Chance,
+    ) -> Rgb {
+        let share = 1.0 / sky.len() as f32;
+        let gathered: Rgb = sky
+            .map(|place| self.radiance(*start, about(normal, place), chance))
+            .sum();
+        Rgb::repeat(self.key_light(start, normal, key)) + share * gathered
+    }
+
+    fn key_light(&self, start: &Point3<f64>, normal: &Vector3<f64>, place: [f64; 2]) -> f32 {
+        let direction = self.studio.key_direction(place);
+        let light = self.studio.key_light(normal, &direction);
+        if light > 0.0 && !self.scene.is_hidden(start, &direction) {
+            light as f32
+        } else {
+            0.0
+        }
+    }
+
+    /// What comes from a direction but the key light itself: the sky, or a surface lit by the key and by what comes to it in turn (the rendering equation of Kajiya 1986, one path of it, ended by chance).
+    fn radiance(&self, mut start: Point3<f64>, mut direction: Vector3<f64>, chance: &mut Chance) -> Rgb {
+        let (mut sum, mut carried) = (Rgb::zeros(), Rgb::repeat(1.0));
+        loop {
+            let (normal, colour);
+            match self.meet(&start, &direction) {
+                Met::Sky => return sum + self.studio.sky(&direction) as f32 * carried,
+                Met::Ground(point) => {
+                    normal = self.up.into_inner();
+                    colour = Rgb::repeat(self.studio.ground() as f32);
+                    start = self.above(&point, &normal);
+                }
+                Met::Object(surface) => {
+                    normal = surface.normal;
+                    colour = self.colour_at(&surface.point);
+                    start = self.above(&surface.start, &normal);
+                }
+            }
+            carried.component_mul_assign(&colour);
+            sum += self.key_light(&start, &normal, chance.place()) * carried;
+            let lively = carried.max().min(MOST_LIVELY);
+            if chance.next() >= f64::from(lively) {
+                return sum;
+            }
+            carried /= lively;
+            direction = about(&normal, chance.place());
+        }
+    }
+
+    /// What a clear coat mirrors towards the viewer (Schlick's Fresnel term, 4 % straight on), the key light's disc a little blurred; and the share of light it keeps from what is below.
+    pub(crate) fn coat(
+        &self,
+        start: &Point3<f64>,
+        normal: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        [u, v]: [f64; 2],
+        chance: &mut Chance,
+    ) -> (Rgb, f32) {
+        let cosine = -direction.dot(normal);
+        let mirrored = about(&(direction + 2.0 * cosine * normal).normalize(), [COAT_BLUR * u, v]);
+        let fresnel = (self.gloss * (0.04 + 0.96 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5))) as f32;
+        if mirrored.dot(normal) <= 0.0 {
+            return (Rgb::zeros(), fresnel);
+        }
+        let mut light = self.radiance(*start, mirrored, chance);
+        if self.studio.is_in_key(&mirrored) && !self.scene.is_hidden(start, &mirrored) {
+            light.add_scalar_mut(self.studio.key_radiance() as f32);
+        }
+        (fresnel * light, fresnel)
+    }
+}
+
+/// Squared sine of the widest angle by which the coat turns what it mirrors.
+const COAT_BLUR: f64 = 0.01;
+
+/// Numbers that belong to one place of the picture (splitmix64).
+pub(crate) struct Chance(u64);
+
+impl Chance {
+    pub(crate) fn new([x, y]: [i64; 2]) -> Self {
+        let mut chance = Self((x as u64) << 32 ^ (y as u64 & 0xFFFF_FFFF));
+        chance.next();
+        chance
+    }
+
+    /// From 0 to 1.
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ z >> 31) >> 11) as f64 * f64::EPSILON / 2.0
+    }
+
+    fn place(&mut self) -> [f64; 2] {
+        [self.next(), self.next()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Chance, Scene, Studio, World};
+    use nalgebra::{Point3, Vector3};
+    use std::f64::consts::PI;
+    use stereology_shape::TriangleMesh;
+
+    /// Light on faces that look up, down and away from the key, with nothing in the way, against its integrals.
+    #[test]
+    fn light_in_the_open_is_the_integral_of_the_sky() {
+        let world = world(&TriangleMesh::icosphere(1.0, 0), &|_| [0.5; 3]);
+        let start = Point3::new(0.0, 0.0, 5.0);
+        let n = 400_u32;
+        let light = |normal: Vector3<f64>| {
+            let sky = (0..n * n).map(|i| [i % n, i / n].map(|k| (f64::from(k) + 0.5) / f64::from(n)));
+            let sky: Vec<[f64; 2]> = sky.collect();
+            f64::from(
+                world
+                    .light_on(&start, &normal, [0.0, 0.0], sky.into_iter(), &mut Chance::new([0, 0]))
+                    .x,
+            )
+        };
+        let away = -(world.studio.key.into_inner() - world.studio.key.z * Vector3::z()).normalize();
+        // Half of the horizon's light, (z − h) ∫ sin² of the height over the half of the sky, half of the ground's.
+        let (horizon, zenith, ground) = (0.42, 0.5, 0.36);
+        let level = 0.5 * horizon + (zenith - horizon) * 2.0 / (3.0 * PI) + 0.5 * ground;
+        for (normal, expected) in [(Vector3::z(), 1.0), (-Vector3::z(), ground), (away, level)] {
+            assert!((light(normal) - expected).abs() < 2e-3, "{normal} {}", light(normal));
+        }
+    }
+
+    /// At the middle of the floor of a deep grey well of reflectance ρ, light that was thrown back once or more comes in the colour of the walls: none where they are black.
+    #[test]
+    fn hollows_glow_in_their_own_colour() {
+        let slab = |low: [f64; 3], high: [f64; 3]| {
+            let (low, high) = (Vector3::from(low), Vector3::from(high));
+            TriangleMesh::cuboid((high - low).into()).mapped(|p| p + 0.5 * (low + high))
+        };
+        let well = slab([-2.0, 1.0, 0.0], [2.0, 2.0, 3.0])
+            .with(&slab([-2.0, -2.0, 0.0], [2.0, -1.0, 3.0]))
+            .with(&slab([1.0, -1.0, 0.0], [2.0, 1.0, 3.0]))
+            .with(&slab([-2.0, -1.0, 0.0], [-1.0, 1.0, 3.0]));
+        let light = |colour: [f32; 3]| {
+            let walls = |_: &Point3<f64>| colour;
+            let world = world(&well, &walls);
+            let sky: Vec<[f64; 2]> = (0..40_000_u32)
+                .map(|i| [i % 200, i / 200].map(|k| (f64::from(k) + 0.5) / 200.0))
+                .collect();
+            let middle = Point3::new(0.0, 0.0, 0.1);
+            world.light_on(
+                &middle,
+                &Vector3::z(),
+                [0.0, 0.0],
+                sky.into_iter(),
+                &mut Chance::new([1, 2]),
+            )
+        };
+        let (black, red) = (light([0.0; 3]), light([0.9, 0.0, 0.0]));
+        assert!((black.x - black.y).abs() < 1e-6 && (red.y - black.y).abs() < 1e-6);
+        assert!(red.x > 1.3 * black.x, "{} {}", red.x, black.x);
+    }
+
+    fn world<'a>(mesh: &TriangleMesh, colour: super::Colour<'a>) -> World<'a> {
+        World {
+            scene: Scene::new(mesh),
+            studio: Studio::new(Vector3::z_axis(), &Vector3::new(-1.0, -1.0, -0.5)),
+            colour,
+            ground: None,
+            up: Vector3::z_axis(),
+            extent: 2.0,
+            middle: Point3::origin(),
+            gloss: 0.0,
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! Where the picture is taken from.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use stereology_shape::TriangleMesh;
 
 /// A camera that looks at the middle of the object.
 ///
@@ -24,6 +25,62 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// On the side of the object that `direction` points to, with `up` up.
+    ///
+    /// A zero or infinite direction is that of [`Camera::default`].
+    ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use stereology_render::Camera;
+    /// let camera = Camera::from_side(&Vector3::new(1.0, 0.0, 1.0), Vector3::z_axis());
+    /// assert!((camera.azimuth - 90.0).abs() < 1e-9 && (camera.elevation - 45.0).abs() < 1e-9);
+    /// ```
+    #[must_use]
+    pub fn from_side(direction: &Vector3<f64>, up: UnitVector3<f64>) -> Self {
+        let camera = Self { up, ..Self::default() };
+        let Some(direction) = direction.try_normalize(0.0).filter(|d| d.norm().is_finite()) else {
+            return camera;
+        };
+        let (_, [front, side]) = camera.out();
+        Self {
+            azimuth: direction.dot(&side).atan2(direction.dot(&front)).to_degrees(),
+            elevation: direction
+                .dot(&up)
+                .clamp(-1.0, 1.0)
+                .asin()
+                .to_degrees()
+                .clamp(-89.0, 89.0),
+            ..camera
+        }
+    }
+
+    /// As near as shows all of the mesh from every side, at one distance: for turntables.
+    ///
+    /// ```
+    /// use stereology_render::Camera;
+    /// use stereology_shape::TriangleMesh;
+    /// let camera = Camera::default().clear_of(&TriangleMesh::icosphere(2.0, 2));
+    /// assert!(camera.distance.is_some_and(|distance| distance > 4.0));
+    /// ```
+    #[must_use]
+    pub fn clear_of(self, mesh: &TriangleMesh) -> Self {
+        let used = || {
+            mesh.triangles
+                .iter()
+                .flatten()
+                .filter_map(|&i| mesh.vertices.get(i as usize))
+        };
+        let Some(&first) = used().next() else { return self };
+        let (low, high) = used().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let middle = nalgebra::center(&low, &high);
+        let radius = used().map(|p| (p - middle).norm()).fold(0.0, f64::max);
+        let half = (FILL * (0.5 * self.field_of_view.to_radians()).tan()).atan();
+        Self {
+            distance: Some(radius / half.sin()),
+            ..self
+        }
+    }
+
     /// From the object towards the camera, and the level directions to where it would stand at azimuth 0 and at 90.
     pub(crate) fn out(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let (azimuth, elevation) = (self.azimuth.to_radians(), self.elevation.to_radians());

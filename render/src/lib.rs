@@ -51,6 +51,7 @@
 mod block;
 mod camera;
 mod hierarchy;
+mod hollows;
 mod light;
 mod mesh_picture;
 mod paths;
@@ -60,5 +61,5 @@ mod tile;
 
 pub use block::{BlockOptions, render_block};
 pub use camera::Camera;
-pub use mesh_picture::{RenderError, RenderOptions, render_mesh, render_mesh_with_progress};
+pub use mesh_picture::{Material, RenderError, RenderOptions, render_material, render_mesh};
 pub use sky_map::sky_map;

@@ -1,6 +1,7 @@
 //! Pictures of meshes.
 
 use crate::camera::{Camera, View};
+use crate::hollows::Hollows;
 use crate::light::{Studio, linear};
 use crate::paths::{Colour, World};
 use crate::scene::Scene;
@@ -134,10 +135,43 @@ pub fn render_mesh(
     camera: &Camera,
     options: &RenderOptions,
 ) -> Result<RgbImage, RenderError> {
-    render_mesh_with_progress(mesh, colour, camera, options, &|_| ControlFlow::Continue(()))
+    let material = Material::new(colour);
+    render_material(mesh, &material, camera, options, &|_| ControlFlow::Continue(()))
 }
 
-/// [`render_mesh`] that tells the share that is done, and may be broken off.
+/// What a mesh is made of: its colour at any point, and its voids.
+#[derive(Clone, Copy)]
+pub struct Material<'a> {
+    colour: Colour<'a>,
+    hollows: Option<Hollows<'a>>,
+}
+
+impl std::fmt::Debug for Material<'_> {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("Material")
+            .field("hollows", &self.hollows.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Material<'a> {
+    /// Without voids; `colour` gives sRGB-encoded values / 255.
+    #[must_use]
+    pub fn new(colour: Colour<'a>) -> Self {
+        Self { colour, hollows: None }
+    }
+
+    /// With voids, cut open by the mesh: `distance` is that to the nearest surface of a void, negative in one, and never longer than the true distance. A void's wall has the colour a little behind it. The mesh should be closed.
+    #[must_use]
+    pub fn with_hollows(self, distance: &'a (dyn Fn(&Point3<f64>) -> f64 + Sync)) -> Self {
+        Self {
+            hollows: Some(distance),
+            ..self
+        }
+    }
+}
+
+/// [`render_mesh`] of a material that may have voids, which tells the share that is done, and may be broken off.
 ///
 /// # Errors
 ///
@@ -145,18 +179,26 @@ pub fn render_mesh(
 ///
 /// # Examples
 ///
+/// A cube with a hole through it:
+///
 /// ```
 /// use std::ops::ControlFlow;
-/// use stereology_render::{Camera, RenderError, RenderOptions, render_mesh_with_progress};
+/// use stereology_render::{Camera, Material, RenderError, RenderOptions, render_material};
 /// use stereology_shape::TriangleMesh;
 ///
-/// let torus = TriangleMesh::torus(2.0, 0.8, 48, 24);
-/// let broken_off = render_mesh_with_progress(&torus, &|_| [0.5; 3], &Camera::default(), &RenderOptions::default(), &|_| ControlFlow::Break(()));
+/// let cube = TriangleMesh::cuboid([1.0; 3]);
+/// let hole = |p: &nalgebra::Point3<f64>| p.x.hypot(p.y) - 0.3;
+/// let material = Material::new(&|_| [0.9, 0.6, 0.3]).with_hollows(&hole);
+/// let (camera, options) = (Camera { elevation: 89.0, up: nalgebra::Vector3::z_axis(), ..Camera::default() }, RenderOptions::default().with_size(64, 64));
+/// let picture = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Continue(()))?;
+/// assert!(picture.get_pixel(32, 32).0[2] > picture.get_pixel(20, 20).0[2]); // the ground is seen through it
+/// let broken_off = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Break(()));
 /// assert!(matches!(broken_off, Err(RenderError::Cancelled)));
+/// # Ok::<(), RenderError>(())
 /// ```
-pub fn render_mesh_with_progress(
+pub fn render_material(
     mesh: &TriangleMesh,
-    colour: Colour<'_>,
+    material: &Material<'_>,
     camera: &Camera,
     options: &RenderOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
@@ -185,7 +227,8 @@ pub fn render_mesh_with_progress(
     let world = World {
         scene: Scene::new(mesh),
         studio: Studio::new(camera.up, &view.forward),
-        colour,
+        colour: material.colour,
+        hollows: material.hollows,
         ground: options.ground.then_some(bottom),
         up: camera.up,
         extent,

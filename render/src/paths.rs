@@ -2,6 +2,7 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "light is f32 where it is seen")]
 
+use crate::hollows::{Hollows, Start};
 use crate::light::{Studio, about, linear};
 use crate::scene::{Scene, Surface};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -23,6 +24,7 @@ pub(crate) struct World<'a> {
     pub(crate) scene: Scene,
     pub(crate) studio: Studio,
     pub(crate) colour: Colour<'a>,
+    pub(crate) hollows: Option<Hollows<'a>>,
     /// Height of the ground along `up`, if there is one.
     pub(crate) ground: Option<f64>,
     pub(crate) up: UnitVector3<f64>,
@@ -41,23 +43,34 @@ pub(crate) enum Met {
 
 impl World<'_> {
     /// The first thing that a ray meets.
-    pub(crate) fn meet(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Met {
+    pub(crate) fn meet(&self, from: &Start, direction: &Vector3<f64>) -> Met {
         let ground = self.ground.and_then(|height| {
-            let distance = (height - from.coords.dot(&self.up)) / direction.dot(&self.up);
+            let distance = (height - from.point.coords.dot(&self.up)) / direction.dot(&self.up);
             (distance > 0.0).then_some(distance)
         });
-        if let Some(hit) = self.scene.first_hit(from, direction, ground.unwrap_or(f64::INFINITY)) {
-            return Met::Object(self.scene.surface(&hit, direction));
+        if let Some(surface) = self.object_along(from, direction, ground.unwrap_or(f64::INFINITY)) {
+            return Met::Object(surface);
         }
         ground
-            .map(|distance| from + distance * direction)
+            .map(|distance| from.point + distance * direction)
             .filter(|point| (point - self.middle).norm() < GROUND_REACH * self.extent)
             .map_or(Met::Sky, Met::Ground)
     }
 
-    /// Where light that leaves or reaches a point begins.
-    pub(crate) fn above(&self, start: &Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
-        start + LIFT * self.extent * normal
+    /// Where light that leaves or reaches a surface begins.
+    pub(crate) fn above(&self, surface: &Surface) -> Start {
+        Start {
+            point: surface.start + LIFT * self.extent * surface.normal,
+            inside: surface.inside,
+        }
+    }
+
+    /// Where light that leaves or reaches the ground begins.
+    pub(crate) fn above_ground(&self, point: &Point3<f64>) -> Start {
+        Start {
+            point: point + LIFT * self.extent * self.up.into_inner(),
+            inside: false,
+        }
     }
 
     /// Linear colour of the object, at most white.
@@ -68,7 +81,7 @@ impl World<'_> {
     /// Light on a surface: of the key in one direction, and from the directions of `sky` about the normal. A face that looks up and is not hidden gets 1 on average.
     pub(crate) fn light_on(
         &self,
-        start: &Point3<f64>,
+        start: &Start,
         normal: &Vector3<f64>,
         key: [f64; 2],
         sky: impl ExactSizeIterator<Item = [f64; 2]>,
@@ -81,10 +94,10 @@ impl World<'_> {
         Rgb::repeat(self.key_light(start, normal, key)) + share * gathered
     }
 
-    fn key_light(&self, start: &Point3<f64>, normal: &Vector3<f64>, place: [f64; 2]) -> f32 {
+    fn key_light(&self, start: &Start, normal: &Vector3<f64>, place: [f64; 2]) -> f32 {
         let direction = self.studio.key_direction(place);
         let light = self.studio.key_light(normal, &direction);
-        if light > 0.0 && !self.scene.is_hidden(start, &direction) {
+        if light > 0.0 && !self.is_hidden(start, &direction) {
             light as f32
         } else {
             0.0
@@ -92,7 +105,7 @@ impl World<'_> {
     }
 
     /// What comes from a direction but the key light itself: the sky, or a surface lit by the key and by what comes to it in turn (the rendering equation of Kajiya 1986, one path of it, ended by chance).
-    fn radiance(&self, mut start: Point3<f64>, mut direction: Vector3<f64>, chance: &mut Chance) -> Rgb {
+    fn radiance(&self, mut start: Start, mut direction: Vector3<f64>, chance: &mut Chance) -> Rgb {
         let (mut sum, mut carried) = (Rgb::zeros(), Rgb::repeat(1.0));
         loop {
             let (normal, colour);
@@ -101,12 +114,12 @@ impl World<'_> {
                 Met::Ground(point) => {
                     normal = self.up.into_inner();
                     colour = Rgb::repeat(self.studio.ground() as f32);
-                    start = self.above(&point, &normal);
+                    start = self.above_ground(&point);
                 }
                 Met::Object(surface) => {
                     normal = surface.normal;
                     colour = self.colour_at(&surface.point);
-                    start = self.above(&surface.start, &normal);
+                    start = self.above(&surface);
                 }
             }
             carried.component_mul_assign(&colour);
@@ -123,7 +136,7 @@ impl World<'_> {
     /// What a clear coat mirrors towards the viewer (Schlick's Fresnel term, 4 % straight on), the key light's disc a little blurred; and the share of light it keeps from what is below.
     pub(crate) fn coat(
         &self,
-        start: &Point3<f64>,
+        start: &Start,
         normal: &Vector3<f64>,
         direction: &Vector3<f64>,
         [u, v]: [f64; 2],
@@ -136,7 +149,7 @@ impl World<'_> {
             return (Rgb::zeros(), fresnel);
         }
         let mut light = self.radiance(*start, mirrored, chance);
-        if self.studio.is_in_key(&mirrored) && !self.scene.is_hidden(start, &mirrored) {
+        if self.studio.is_in_key(&mirrored) && !self.is_hidden(start, &mirrored) {
             light.add_scalar_mut(self.studio.key_radiance() as f32);
         }
         (fresnel * light, fresnel)
@@ -172,7 +185,7 @@ impl Chance {
 
 #[cfg(test)]
 mod tests {
-    use super::{Chance, Scene, Studio, World};
+    use super::{Chance, Scene, Start, Studio, World};
     use nalgebra::{Point3, Vector3};
     use std::f64::consts::PI;
     use stereology_shape::TriangleMesh;
@@ -181,7 +194,7 @@ mod tests {
     #[test]
     fn light_in_the_open_is_the_integral_of_the_sky() {
         let world = world(&TriangleMesh::icosphere(1.0, 0), &|_| [0.5; 3]);
-        let start = Point3::new(0.0, 0.0, 5.0);
+        let start = outside(Point3::new(0.0, 0.0, 5.0));
         let n = 400_u32;
         let light = |normal: Vector3<f64>| {
             let sky = (0..n * n).map(|i| [i % n, i / n].map(|k| (f64::from(k) + 0.5) / f64::from(n)));
@@ -218,7 +231,7 @@ mod tests {
             let sky: Vec<[f64; 2]> = (0..40_000_u32)
                 .map(|i| [i % 200, i / 200].map(|k| (f64::from(k) + 0.5) / 200.0))
                 .collect();
-            let middle = Point3::new(0.0, 0.0, 0.1);
+            let middle = outside(Point3::new(0.0, 0.0, 0.1));
             world.light_on(
                 &middle,
                 &Vector3::z(),
@@ -232,11 +245,16 @@ mod tests {
         assert!(red.x > 1.3 * black.x, "{} {}", red.x, black.x);
     }
 
+    fn outside(point: Point3<f64>) -> Start {
+        Start { point, inside: false }
+    }
+
     fn world<'a>(mesh: &TriangleMesh, colour: super::Colour<'a>) -> World<'a> {
         World {
             scene: Scene::new(mesh),
             studio: Studio::new(Vector3::z_axis(), &Vector3::new(-1.0, -1.0, -0.5)),
             colour,
+            hollows: None,
             ground: None,
             up: Vector3::z_axis(),
             extent: 2.0,

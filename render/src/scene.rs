@@ -30,6 +30,8 @@ pub(crate) struct Surface {
     pub(crate) normal: Vector3<f64>,
     /// Where rays of light start: on the smooth surface that the facets stand for, or facets would shade themselves.
     pub(crate) start: Point3<f64>,
+    /// The wall of a void inside the mesh.
+    pub(crate) inside: bool,
 }
 
 impl Scene {
@@ -111,6 +113,7 @@ impl Scene {
             point,
             normal,
             start: point + lift(0) + lift(1) + lift(2),
+            inside: false,
         }
     }
 }

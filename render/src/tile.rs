@@ -6,6 +6,7 @@
 )]
 
 use crate::camera::View;
+use crate::hollows::Start;
 use crate::light::encoded_byte;
 use crate::paths::{Chance, GROUND_REACH, Met, Rgb, World};
 use nalgebra::{Point3, Vector3};
@@ -91,19 +92,23 @@ impl Picture<'_> {
             light: Rgb::repeat(1.0),
             shine: Rgb::zeros(),
         };
-        let start = match world.meet(&eye, &direction) {
+        let camera = Start {
+            point: eye,
+            inside: false,
+        };
+        let start = match world.meet(&camera, &direction) {
             Met::Sky => return seen,
             Met::Ground(point) => {
                 seen.kind = Kind::Ground;
                 seen.point = point;
-                world.above(&point, &seen.normal)
+                world.above_ground(&point)
             }
             Met::Object(surface) => {
                 seen.kind = Kind::Object;
                 seen.point = surface.point;
                 seen.normal = surface.normal;
                 seen.colour = world.colour_at(&surface.point);
-                world.above(&surface.start, &surface.normal)
+                world.above(&surface)
             }
         };
         let rays = (SKY_RAYS / (self.samples * self.samples)).max(1) as u32;

@@ -17,18 +17,30 @@ use nalgebra::{Point3, Vector3};
 pub struct ColouredMesh {
     /// Its triangles.
     pub mesh: TriangleMesh,
-    /// Colour of each vertex, sRGB-encoded / 255.
-    pub colours: Vec<[f32; 3]>,
+    /// Colour of each vertex, sRGB-encoded / 255, and its alpha: 1, or 0 where there is a hole.
+    pub colours: Vec<[f32; 4]>,
     /// Unit normals at the corners of each triangle.
     pub normals: Vec<[Vector3<f64>; 3]>,
 }
 
 impl ColouredMesh {
-    /// A mesh with the colour that `colour` has at its vertices, and [`corner_normals`]. Indices must be in range.
+    /// Whether all of it is seen.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.colours.iter().all(|colour| colour[3] >= 1.0)
+    }
+
+    /// A mesh without holes, with the colour that `colour` has at its vertices, and [`corner_normals`]. Indices must be in range.
     #[must_use]
     pub fn new(mesh: TriangleMesh, colour: impl Fn(&Point3<f64>) -> [f32; 3]) -> Self {
         Self {
-            colours: mesh.vertices.iter().map(colour).collect(),
+            colours: mesh
+                .vertices
+                .iter()
+                .map(|p| {
+                    let [r, g, b] = colour(p);
+                    [r, g, b, 1.0]
+                })
+                .collect(),
             normals: corner_normals(&mesh),
             mesh,
         }

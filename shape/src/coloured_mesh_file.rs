@@ -60,18 +60,20 @@ fn check(of: &ColouredMesh) -> io::Result<()> {
 #[allow(clippy::cast_possible_truncation, reason = "clamped to bytes")]
 fn ply(out: &mut impl Write, of: &ColouredMesh) -> io::Result<()> {
     let ColouredMesh { mesh, colours, .. } = of;
+    let channels = if of.is_opaque() { 3 } else { 4 };
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+         property uchar red\nproperty uchar green\nproperty uchar blue\n{}element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.vertices.len(),
+        if channels == 4 { "property uchar alpha\n" } else { "" },
         mesh.triangles.len()
     )?;
     for (vertex, colour) in mesh.vertices.iter().zip(colours) {
         for x in vertex.iter() {
             out.write_all(&x.to_le_bytes())?;
         }
-        out.write_all(&colour.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8))?;
+        out.write_all(&colour.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)[..channels])?;
     }
     for triangle in &mesh.triangles {
         out.write_all(&[3])?;
@@ -136,8 +138,12 @@ fn glb(out: &mut impl Write, coloured: &ColouredMesh) -> io::Result<()> {
     of.iter()
         .for_each(|(_, normal)| normal.iter().for_each(|x| data.extend(x.to_le_bytes())));
     for (vertex, _) in &of {
-        let [r, g, b] = colours[*vertex as usize].map(|c| (linear(c) * 65535.0).round() as u16);
-        [r, g, b, u16::MAX].iter().for_each(|c| data.extend(c.to_le_bytes()));
+        let [r, g, b, a] = colours[*vertex as usize];
+        let shares = [linear(r), linear(g), linear(b), a.clamp(0.0, 1.0)];
+        shares
+            .map(|share| (share * 65535.0).round() as u16)
+            .iter()
+            .for_each(|c| data.extend(c.to_le_bytes()));
     }
     triangles
         .iter()
@@ -166,13 +172,19 @@ fn glb(out: &mut impl Write, coloured: &ColouredMesh) -> io::Result<()> {
     let json = format!(
         concat!(
             r#"{{"asset":{{"version":"2.0","generator":"stereology"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0,"translation":[{},{},{}]}}],"#,
-            r#""materials":[{{"doubleSided":true,"pbrMetallicRoughness":{{"metallicFactor":0,"roughnessFactor":0.6}}}}],"#,
+            r#""materials":[{{{}"doubleSided":true,"pbrMetallicRoughness":{{"metallicFactor":0,"roughnessFactor":0.6}}}}],"#,
             r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":1,"COLOR_0":2}},"indices":3,"material":0}}]}}],"#,
             r#""accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#
         ),
         c.x,
         c.y,
         c.z,
+        // Half between what is seen and a hole is the hole's rim.
+        if coloured.is_opaque() {
+            ""
+        } else {
+            r#""alphaMode":"MASK","alphaCutoff":0.5,"#
+        },
         accessors.join(","),
         views.join(","),
         data.len()

@@ -202,6 +202,9 @@ struct SolidFile {
     meshes: Vec<Option<MeshEntry>>,
     /// Mean colour of each particle.
     colours: Vec<[f32; 3]>,
+    /// Shapes that are voids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    voids: Vec<usize>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -266,6 +269,7 @@ pub fn save_solid(
             .map(|of| of.body.mesh().filter(|_| from_file(&of.name)).map(entry))
             .collect(),
         colours: solid.colours().to_vec(),
+        voids: solid.voids().to_vec(),
     };
     write_json(&folder.join("solid.json"), &file)?;
     write_texture(&folder.join("texture.npy"), residual)
@@ -332,6 +336,7 @@ pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
         .map_err(|error| FileError::value(&packing_path, error))?;
     let residual = read_texture(&folder.join("texture.npy"), file.voxel)?;
     let solid = Solid::new(bodies, particles, file.colours, period, file.binder, Some(residual))
+        .and_then(|solid| solid.with_voids(&file.voids))
         .map_err(|error: SolidError| FileError::value(&path, error))?;
     Ok(SavedSolid {
         solid,

@@ -1,12 +1,55 @@
-//! Pictures of what the rooms make together: a packing, lit as by [`render`](crate::render).
+//! Pictures of what the rooms make together: a packing, a mesh carved from a solid, lit as by [`render`](crate::render).
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
 use stereology_anneal::Packing;
-use stereology_render::{Camera, RenderError, RenderOptions, render_mesh};
+use stereology_render::{Camera, Material, RenderError, RenderOptions, render_material, render_mesh};
 use stereology_shape::{BodyKind, Particle, TriangleMesh, UnitBody};
+use stereology_volume::Solid;
+
+/// Picture of a mesh carved from a solid, in the solid's coordinates; voids are holes.
+///
+/// # Errors
+///
+/// As [`render_material`].
+///
+/// # Examples
+///
+/// ```
+/// use nalgebra::{Point3, UnitQuaternion, Vector3};
+/// use std::ops::ControlFlow;
+/// use stereology::pictures::picture_of_solid;
+/// use stereology::render::{Camera, RenderOptions};
+/// use stereology::shape::{Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
+/// use stereology::volume::Solid;
+///
+/// let ball = UnitBody::new(&Body::sphere(1.0)?);
+/// let bubble = Particle { shape: 0, size: 3.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
+/// let foam = Solid::new(vec![ball], vec![bubble], vec![[0.5; 3]], PeriodicBox::new(Vector3::repeat(5.0))?, [0.9, 0.8, 0.5], None)?.with_voids(&[0])?;
+/// let block = TriangleMesh::cuboid([5.0; 3]);
+/// let options = RenderOptions::default().with_size(60, 60);
+/// let picture = picture_of_solid(&foam, &block, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
+/// assert_eq!(picture.dimensions(), (60, 60));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn picture_of_solid(
+    solid: &Solid,
+    mesh: &TriangleMesh,
+    camera: &Camera,
+    options: &RenderOptions,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<RgbImage, RenderError> {
+    let colour = |p: &Point3<f64>| solid.colour_at(p);
+    let voids = |p: &Point3<f64>| solid.void_distance_at(p);
+    let mut material = Material::new(&colour);
+    if !solid.voids().is_empty() {
+        material = material.with_hollows(&voids);
+    }
+    render_material(mesh, &material, camera, options, progress)
+}
 
 /// Picture of the particles of a packing, each whole where its centre is in the box, coloured by `colour` of its index.
 ///

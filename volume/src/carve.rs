@@ -73,7 +73,7 @@ impl Solid {
     /// Gives the surface of `mesh` the colours the solid has there, where `place` tells where in the solid a point of the mesh is.
     ///
     /// Triangles are bisected at their longest edges (Rivara 1984), so they stay well shaped and no gaps open, until colours between the ends of each edge are what a viewer interpolates, or edges are as short as the texture's
-    /// detail. An edge longer than eight details is always split, so that no particle is overlooked. Any triangles will do, open or not. Shading stays that of the mesh as given. Cost: about 10 colours an edge and round.
+    /// detail. An edge longer than eight details is always split, so that no particle is overlooked. In voids alpha is 0: a hole. Any triangles will do, open or not. Shading stays that of the mesh as given. Cost: about 10 colours an edge and round.
     ///
     /// # Errors
     ///
@@ -114,7 +114,11 @@ impl Solid {
         if !(detail.is_finite() && detail > 0.0 && contrast.is_finite() && contrast > 0.0) {
             return Err(CarveError::Options { detail, contrast });
         }
-        let colour = |p: &Point3<f64>| self.colour_at(&place(p));
+        let colour = |p: &Point3<f64>| {
+            let p = place(p);
+            let [r, g, b] = self.colour_at(&p);
+            [r, g, b, if self.is_void_at(&p) { 0.0 } else { 1.0 }]
+        };
         let mut refined = Refined::new(mesh, &colour);
         let measure = Measure {
             colour: &colour,
@@ -177,7 +181,7 @@ fn edge(a: u32, b: u32) -> Edge {
 
 /// What tells whether an edge is fine enough.
 struct Measure<'a> {
-    colour: &'a (dyn Fn(&Point3<f64>) -> [f32; 3] + Sync),
+    colour: &'a (dyn Fn(&Point3<f64>) -> [f32; 4] + Sync),
     place: &'a (dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
     detail: f64,
     contrast: f32,
@@ -190,7 +194,7 @@ const SHORTEST: f64 = 2.0;
 
 impl Measure<'_> {
     /// How much an edge needs to be split; `None` if it does not.
-    fn need(&self, ends: [&Point3<f64>; 2], colours: [[f32; 3]; 2]) -> Option<f32> {
+    fn need(&self, ends: [&Point3<f64>; 2], colours: [[f32; 4]; 2]) -> Option<f32> {
         let length = ((self.place)(ends[1]) - (self.place)(ends[0])).norm() / self.detail;
         if length < SHORTEST {
             return None;
@@ -207,7 +211,7 @@ impl Measure<'_> {
             #[allow(clippy::cast_possible_truncation, reason = "a share of an edge")]
             let t = t as f32;
             let between = |c: usize| colours[0][c] + t * (colours[1][c] - colours[0][c]);
-            (0..3).map(|c| (seen[c] - between(c)).abs()).fold(0.0, f32::max)
+            (0..4).map(|c| (seen[c] - between(c)).abs()).fold(0.0, f32::max)
         });
         Some(off.fold(0.0, f32::max)).filter(|off| *off > self.contrast)
     }
@@ -216,12 +220,12 @@ impl Measure<'_> {
 /// The mesh as it is refined.
 struct Refined {
     mesh: TriangleMesh,
-    colours: Vec<[f32; 3]>,
+    colours: Vec<[f32; 4]>,
     normals: Vec<[Vector3<f64>; 3]>,
 }
 
 impl Refined {
-    fn new(mesh: &TriangleMesh, colour: &(dyn Fn(&Point3<f64>) -> [f32; 3] + Sync)) -> Self {
+    fn new(mesh: &TriangleMesh, colour: &(dyn Fn(&Point3<f64>) -> [f32; 4] + Sync)) -> Self {
         Self {
             mesh: mesh.clone(),
             colours: mesh.vertices.par_iter().map(colour).collect(),
@@ -256,7 +260,7 @@ impl Refined {
         clippy::cast_possible_truncation,
         reason = "more than 2^32 vertices do not fit into memory"
     )]
-    fn split(&mut self, edges: Vec<Edge>, colour: &(dyn Fn(&Point3<f64>) -> [f32; 3] + Sync)) {
+    fn split(&mut self, edges: Vec<Edge>, colour: &(dyn Fn(&Point3<f64>) -> [f32; 4] + Sync)) {
         let mut middles: BTreeMap<Edge, u32> = edges.into_iter().map(|edge| (edge, 0)).collect();
         loop {
             let before = middles.len();
@@ -276,7 +280,7 @@ impl Refined {
             let between = center(&self.mesh.vertices[a as usize], &self.mesh.vertices[b as usize]);
             self.mesh.vertices.push(between);
         }
-        let new: Vec<[f32; 3]> = self.mesh.vertices[first..].par_iter().map(colour).collect();
+        let new: Vec<[f32; 4]> = self.mesh.vertices[first..].par_iter().map(colour).collect();
         self.colours.extend(new);
 
         let (triangles, normals) = (

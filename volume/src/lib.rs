@@ -62,6 +62,7 @@ mod residual;
 mod sections;
 mod slice;
 mod solid;
+mod voids;
 mod voxels;
 
 pub use carve::{CarveError, CarveOptions, Carved};

@@ -2,6 +2,7 @@
 
 use crate::cells::Cells;
 use crate::residual::{Field, Lookup, Residual};
+use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
 use ndarray::ArrayView4;
 use std::f64::consts::PI;
@@ -52,6 +53,7 @@ pub struct Solid {
     residual: Option<Arc<Fields>>,
     lookup: Lookup,
     border_samples: u32,
+    pub(crate) voids: Option<Arc<Voids>>,
 }
 
 #[derive(Debug)]
@@ -143,6 +145,14 @@ pub enum SolidError {
         /// Edge of a voxel.
         voxel: f64,
     },
+    /// A void is of a shape that is not there.
+    #[error("shape {shape} cannot be a void: there are {bodies} shapes, counted from 0")]
+    Void {
+        /// The shape named.
+        shape: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
     /// A plane has no direction or no place.
     #[error("no plane has normal {normal:?} and offset {offset}; the normal must not be zero, and all must be finite")]
     Plane {
@@ -206,6 +216,7 @@ impl Solid {
             residual: residual.map(Arc::new),
             lookup: Lookup::default(),
             border_samples: 4,
+            voids: None,
         })
     }
 

@@ -26,11 +26,13 @@ pub enum Channel {
     Category,
     /// Distance to the nearest surface of a particle, negative inside: `f32`.
     Distance,
+    /// Mask: `u8`, 0 in a void, else 255.
+    Alpha,
 }
 
 /// A name that is no channel.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no channel; use rgb, id, category or distance")]
+#[error("'{name}' is no channel; use rgb, id, category, distance or alpha")]
 #[non_exhaustive]
 pub struct ChannelError {
     /// The name given.
@@ -46,6 +48,7 @@ impl FromStr for Channel {
             "id" => Ok(Self::Id),
             "category" => Ok(Self::Category),
             "distance" => Ok(Self::Distance),
+            "alpha" => Ok(Self::Alpha),
             _ => Err(ChannelError { name: name.to_owned() }),
         }
     }
@@ -155,6 +158,11 @@ impl Solid {
         fill(grid, z, slab, |p| [self.distance_at(p) as f32]);
     }
 
+    /// Fills the slab at `z` with 0 in voids, else 255.
+    pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
+        fill(grid, z, slab, |p| [if self.is_void_at(p) { 0 } else { 255 }]);
+    }
+
     /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
     ///
     /// `progress` is told the share that is done and may break off. Memory beside the solid: one slab.
@@ -231,6 +239,7 @@ impl Solid {
             Channel::Id => file.write(1, |grid, z, slab| self.fill_ids(grid, z, slab)),
             Channel::Category => file.write(1, |grid, z, slab| self.fill_categories(grid, z, slab)),
             Channel::Distance => file.write(1, |grid, z, slab| self.fill_distances(grid, z, slab)),
+            Channel::Alpha => file.write(1, |grid, z, slab| self.fill_alpha(grid, z, slab)),
         }
     }
 }

@@ -41,7 +41,7 @@ np.array(mi.render(scene)).astype("<f4").tofile(folder + "/mitsuba.f32")
 pub fn run(python: &Path, folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     let mesh = TriangleMesh::torus(2.0, 0.9, 96, 48);
-    write_mesh(&folder.join("mesh.ply"), &mesh)?;
+    write_mesh(folder.join("mesh.ply"), &mesh)?;
     let camera = Camera {
         distance: Some(DISTANCE),
         ..Camera::default()
@@ -77,7 +77,12 @@ pub fn run(python: &Path, folder: &Path) -> Result<()> {
         .with_context(|| format!("{} cannot be run", python.display()))?;
     ensure!(status.success(), "Mitsuba failed; is it there (pip install mitsuba)?");
     let bytes = std::fs::read(folder.join("mitsuba.f32"))?;
-    let values = bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
+    let values = bytes
+        .as_chunks()
+        .0
+        .iter()
+        .map(|four| f32::from_le_bytes(*four))
+        .collect();
     let theirs = Array3::from_shape_vec((SIDE as usize, SIDE as usize, 3), values)?;
     compare(&ours, &theirs, folder)
 }

@@ -59,6 +59,8 @@ pub enum Channel {
     Category,
     /// Signed distance to the nearest particle surface, f32
     Distance,
+    /// Mask: 0 in voids, else 255, u8
+    Alpha,
 }
 
 fn samples(text: &str) -> Result<usize, String> {
@@ -78,6 +80,7 @@ impl Export {
             Channel::Id => (volume::Channel::Id, "id"),
             Channel::Category => (volume::Channel::Category, "category"),
             Channel::Distance => (volume::Channel::Distance, "distance"),
+            Channel::Alpha => (volume::Channel::Alpha, "alpha"),
         };
         let step = Step::begin("voxels", everywhere.quiet);
         let progress = |done: f64| step.at(done);

@@ -1,5 +1,6 @@
 //! `stereology synthesize`: a photograph in, a solid out.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -8,11 +9,13 @@ use serde_json::{Map, Value, json};
 use stereology::anneal::PackOptions;
 use stereology::files;
 use stereology::grid::Format;
+use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{self, Comparison, Extent, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions};
 use stereology::pyramid::TextureReport;
-use stereology::render::{BlockOptions, render_block};
+use stereology::render::BlockOptions;
 use stereology::sample;
 use stereology::segment::{read_labels_for, read_photo};
+use stereology::shape::TriangleMesh;
 use stereology::volume::{Channel, SlicePlane};
 
 use crate::answer::Answer;
@@ -69,6 +72,9 @@ pub struct Solid {
     /// Number of particles, instead of --box
     #[arg(long, value_name = "N", value_parser = count)]
     pub count: Option<usize>,
+    /// Number of a --shape, from 0, whose particles are voids: pores, bubbles; may be repeated
+    #[arg(long = "void", value_name = "K")]
+    pub voids: Vec<usize>,
     /// Fraction of the volume inside particles [default: the photograph's area fraction]
     #[arg(long, value_name = "PHI", value_parser = share)]
     pub fraction: Option<f64>,
@@ -108,6 +114,12 @@ impl Synthesize {
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
         let (photo, name) = self.photo()?;
         let types = self.types()?;
+        let shapes = types.types().len();
+        if let Some(none) = self.solid.voids.iter().find(|&&k| k >= shapes) {
+            return Err(Failure::usage(format!(
+                "--void {none}: there are {shapes} shapes, counted from 0"
+            )));
+        }
         let labels = self
             .segment
             .labels
@@ -151,6 +163,7 @@ impl Synthesize {
                 (None, None) => Extent::Auto,
             },
             fraction: self.solid.fraction,
+            voids: self.solid.voids.clone(),
             pack: PackOptions::default()
                 .with_mode(self.solid.pack_mode.way())
                 .with_seed(seed),
@@ -336,12 +349,7 @@ impl Synthesize {
         let solid = &synthesis.solid;
         let (width, height) = synthesis.segmentation.photo().dimensions();
         let mut pictures = Pictures {
-            cube: render_block(
-                &|p| solid.colour_at(p),
-                solid.period().sides(),
-                &BlockOptions::default(),
-            )
-            .or_fail()?,
+            cube: cube(solid)?,
             sections: Vec::new(),
         };
         for (normal, share) in SECTIONS {
@@ -352,6 +360,14 @@ impl Synthesize {
         }
         Ok(pictures)
     }
+}
+
+/// One period of the solid as a block.
+fn cube(solid: &stereology::volume::Solid) -> Result<RgbImage, Failure> {
+    let sides = solid.period().sides();
+    let block = TriangleMesh::cuboid(sides.into()).mapped(|p| p + 0.5 * sides);
+    let BlockOptions { camera, picture } = BlockOptions::default();
+    picture_of_solid(solid, &block, &camera, &picture, &|_| ControlFlow::Continue(())).or_fail()
 }
 
 /// Two pictures of one height side by side.

@@ -178,3 +178,51 @@ fn a_small_photograph_becomes_a_solid() {
         "{error}"
     );
 }
+
+#[test]
+fn bubbles_are_holes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (photo, out) = (path(&folder, "discs.png"), path(&folder, "out"));
+    write_discs(&photo);
+    let (code, _, error) = stereology(&["synthesize", &photo, "-o", &out, "--void", "1"]);
+    assert!(code == 2 && error.contains("counted from 0"), "{code} {error}");
+    answer(&[&["synthesize", &photo, "-o", &out, "--void", "0"], &SMALL[..]].concat());
+    let file = |name: &str| path(&folder, name);
+    for channel in ["alpha", "category"] {
+        answer(&[
+            "export",
+            &out,
+            "--voxels",
+            "24",
+            "--channel",
+            channel,
+            "-o",
+            &file(&format!("{channel}.npy")),
+        ]);
+    }
+    let [alpha, category] = ["alpha.npy", "category.npy"].map(|name| fs::read(file(name)).unwrap());
+    let from = alpha.len() - 24 * 24 * 24;
+    assert!(
+        alpha[from..]
+            .iter()
+            .zip(&category[from..])
+            .all(|(alpha, category)| (*alpha == 0) == (*category > 0))
+    );
+    assert!(alpha[from..].contains(&0) && alpha[from..].contains(&255));
+    let turned = answer(&[
+        "render",
+        &out,
+        "--size",
+        "40",
+        "--turntable",
+        "3",
+        "--samples",
+        "1",
+        "-o",
+        &file("t.png"),
+    ]);
+    assert_eq!(turned["pictures"], 3);
+    for frame in ["t_000.png", "t_001.png", "t_002.png"] {
+        assert_eq!(image::open(file(frame)).unwrap().width(), 40);
+    }
+}

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use stereology_render::{
-    BlockOptions, Camera, RenderError, RenderOptions, render_block, render_mesh, render_mesh_with_progress,
+    BlockOptions, Camera, Material, RenderError, RenderOptions, render_block, render_material, render_mesh,
 };
 use stereology_shape::TriangleMesh;
 
@@ -147,6 +147,58 @@ fn the_ground_shows_a_shadow_only() {
 fn a_picture_can_be_broken_off() {
     let ball = TriangleMesh::icosphere(1.0, 1);
     let stop = |_| ControlFlow::Break(());
-    let broken = render_mesh_with_progress(&ball, &|_| [0.5; 3], &Camera::default(), &FLOATING, &stop);
+    let broken = render_material(
+        &ball,
+        &Material::new(&|_| [0.5; 3]),
+        &Camera::default(),
+        &FLOATING,
+        &stop,
+    );
     assert_eq!(broken.unwrap_err(), RenderError::Cancelled);
+}
+
+/// A block with a void at its end looks like the shorter block.
+#[test]
+fn a_void_is_cut_away() {
+    let whole = TriangleMesh::cuboid([2.0, 2.0, 2.0]);
+    let rest = TriangleMesh::cuboid([2.0, 2.0, 1.3]).mapped(|p| p - Vector3::new(0.0, 0.0, 0.35));
+    let end = |p: &Point3<f64>| 0.3 - p.z;
+    let colour = |p: &Point3<f64>| {
+        if (7.0 * p.x).sin() > 0.0 {
+            [0.9, 0.5, 0.3]
+        } else {
+            [0.3, 0.4, 0.6]
+        }
+    };
+    let camera = Camera {
+        distance: Some(8.0),
+        up: Vector3::z_axis(),
+        elevation: 40.0,
+        ..Camera::default()
+    };
+    let target = |mesh: &TriangleMesh, material: &Material<'_>| {
+        // The camera looks at the middle of the mesh: both are given the same, by two far corners of no size.
+        let corner = |s: f64| TriangleMesh {
+            vertices: vec![Point3::new(s, s, s); 3],
+            triangles: vec![[0, 1, 2]],
+        };
+        let mesh = mesh.with(&corner(1.0)).with(&corner(-1.0));
+        render_material(&mesh, material, &camera, &FLOATING, &|_| ControlFlow::Continue(())).unwrap()
+    };
+    let hollow = target(&whole, &Material::new(&colour).with_hollows(&end));
+    let cut = target(&rest, &Material::new(&colour));
+    let off: u32 = hollow
+        .iter()
+        .zip(cut.iter())
+        .map(|(a, b)| u32::from(a.abs_diff(*b)))
+        .sum();
+    let mean = f64::from(off) / hollow.len() as f64;
+    assert!(mean < 0.6, "{mean}");
+    let solid = target(&whole, &Material::new(&colour));
+    let off: u32 = solid
+        .iter()
+        .zip(cut.iter())
+        .map(|(a, b)| u32::from(a.abs_diff(*b)))
+        .sum();
+    assert!(f64::from(off) / solid.len() as f64 > 5.0);
 }

@@ -59,6 +59,8 @@ pub struct SynthesisOptions {
     pub extent: Extent,
     /// Volume fraction of particles; by default the photograph's area fraction.
     pub fraction: Option<f64>,
+    /// Particle types, by index, that are voids.
+    pub voids: Vec<usize>,
     /// Packing.
     pub pack: PackOptions,
     /// The residual volume.
@@ -78,6 +80,7 @@ impl Default for SynthesisOptions {
             densities: DensityOptions::default(),
             extent: Extent::default(),
             fraction: None,
+            voids: Vec::new(),
             pack: PackOptions::default(),
             texture: TextureOptions::default(),
             texture_voxels: 128,
@@ -237,7 +240,8 @@ pub fn synthesize(
         population.period,
         segmentation.binder.colour.map(|c| c as f32),
         Some(details.residual.clone()),
-    )?;
+    )?
+    .with_voids(&options.voids)?;
     let verification = verify(&solid, &segmentation, &profiles, recipe, options.pixel, &|done| {
         progress(Step::Verify, done)
     })?;

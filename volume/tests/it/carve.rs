@@ -60,7 +60,8 @@ proptest! {
             prop_assert!((after.volume() / before.volume() - 1.0).abs() < 1e-9);
             prop_assert!((after.surface_area() / before.surface_area() - 1.0).abs() < 1e-9);
             for (v, colour) in carved.mesh.vertices.iter().zip(&carved.colours) {
-                prop_assert_eq!(&solid.colour_at(v), colour);
+                prop_assert_eq!(&solid.colour_at(v)[..], &colour[..3]);
+                prop_assert_eq!(colour[3], 1.0);
             }
             prop_assert_eq!(carved.normals.len(), carved.mesh.triangles.len());
         }

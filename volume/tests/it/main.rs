@@ -8,4 +8,5 @@ mod colours;
 mod points;
 mod sections;
 mod spheres;
+mod voids;
 mod voxels;

@@ -182,7 +182,7 @@ fn a_void_is_cut_away() {
             vertices: vec![Point3::new(s, s, s); 3],
             triangles: vec![[0, 1, 2]],
         };
-        let mesh = mesh.with(&corner(1.0)).with(&corner(-1.0));
+        let mesh = mesh.clone().with(&corner(1.0)).with(&corner(-1.0));
         render_material(&mesh, material, &camera, &FLOATING, &|_| ControlFlow::Continue(())).unwrap()
     };
     let hollow = target(&whole, &Material::new(&colour).with_hollows(&end));

@@ -10,7 +10,7 @@ use stereology_render::{Camera, Material, RenderError, RenderOptions, render_mat
 use stereology_shape::{BodyKind, Particle, TriangleMesh, UnitBody};
 use stereology_volume::Solid;
 
-/// Picture of a mesh carved from a solid, in the solid's coordinates; voids are holes.
+/// Picture of a mesh carved from a solid; voids are holes. `place` tells where in the solid a point of the mesh is and keeps lengths: identity, a shift, [`turned`](stereology_volume::turned).
 ///
 /// # Errors
 ///
@@ -31,19 +31,20 @@ use stereology_volume::Solid;
 /// let foam = Solid::new(vec![ball], vec![bubble], vec![[0.5; 3]], PeriodicBox::new(Vector3::repeat(5.0))?, [0.9, 0.8, 0.5], None)?.with_voids(&[0])?;
 /// let block = TriangleMesh::cuboid([5.0; 3]);
 /// let options = RenderOptions::default().with_size(60, 60);
-/// let picture = picture_of_solid(&foam, &block, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
+/// let picture = picture_of_solid(&foam, &block, &|p| *p, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
 /// assert_eq!(picture.dimensions(), (60, 60));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn picture_of_solid(
     solid: &Solid,
     mesh: &TriangleMesh,
+    place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
     camera: &Camera,
     options: &RenderOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<RgbImage, RenderError> {
-    let colour = |p: &Point3<f64>| solid.colour_at(p);
-    let voids = |p: &Point3<f64>| solid.void_distance_at(p);
+    let colour = |p: &Point3<f64>| solid.colour_at(&place(p));
+    let voids = |p: &Point3<f64>| solid.void_distance_at(&place(p));
     let mut material = Material::new(&colour);
     if !solid.voids().is_empty() {
         material = material.with_hollows(&voids);

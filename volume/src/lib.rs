@@ -62,6 +62,7 @@ mod residual;
 mod sections;
 mod slice;
 mod solid;
+mod turned;
 mod voids;
 mod voxels;
 
@@ -70,4 +71,5 @@ pub use residual::{Lookup, Residual};
 pub use sections::Axis;
 pub use slice::SlicePlane;
 pub use solid::{Solid, SolidError};
+pub use turned::turned;
 pub use voxels::{Channel, ChannelError, VoxelGrid};

@@ -5,6 +5,7 @@ use crate::residual::{Field, Lookup, Residual};
 use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
 use ndarray::ArrayView4;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
@@ -297,6 +298,25 @@ impl Solid {
             None => mean,
             Some(_) => add(mean, self.residual_within(&p, id.is_some())),
         }
+    }
+
+    /// Colours at many points, in their order, shared among threads: the same bits as [`Self::colour_at`], at any number of them.
+    ///
+    /// ```
+    /// # use nalgebra::{Point3, Vector3};
+    /// # use stereology_shape::PeriodicBox;
+    /// # use stereology_volume::Solid;
+    /// let solid = Solid::new(vec![], vec![], vec![], PeriodicBox::new(Vector3::repeat(1.0))?, [0.5; 3], None)?;
+    /// assert_eq!(solid.colours_at(&[Point3::origin(); 2]), [[0.5; 3]; 2]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn colours_at(&self, points: &[Point3<f64>]) -> Vec<[f32; 3]> {
+        points
+            .par_iter()
+            .with_min_len(1024)
+            .map(|p| self.colour_at(p))
+            .collect()
     }
 
     /// Distance to the nearest surface of a particle, negative inside; infinite without particles. A microsecond or more: exact, not a table.

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Point3;
 use stereology::pipeline::Warning;
 use stereology::shape::{read_mesh, write_coloured_mesh};
-use stereology::volume::{CarveError, CarveOptions};
+use stereology::volume::{CarveError, CarveOptions, turned};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -34,6 +35,9 @@ pub struct Carve {
     /// Length in the mesh that one period of the solid takes [default: the mesh's longest side]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     pub period: Option<f64>,
+    /// Turn the solid in the mesh, so that flat faces do not show its period
+    #[arg(long)]
+    pub turned: bool,
     /// Triangles at most
     #[arg(long, value_name = "N", default_value_t = CarveOptions::default().most_triangles, value_parser = count)]
     pub triangles: usize,
@@ -56,9 +60,14 @@ impl Carve {
             most_triangles: self.triangles,
             ..CarveOptions::default()
         };
+        let place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync) = if self.turned {
+            &|p| turned(&placement.apply(p))
+        } else {
+            &|p| placement.apply(p)
+        };
         let step = Step::begin("carving", everywhere.quiet);
         let carved = solid
-            .carve(&mesh, &|p| placement.apply(p), &options, &|done| step.at(done))
+            .carve(&mesh, place, &options, &|done| step.at(done))
             .map_err(|error| match error {
                 CarveError::Cancelled => Failure::stopped(),
                 error => Failure::run(format!("{}: {error}", self.mesh.display())),

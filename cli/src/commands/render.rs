@@ -8,7 +8,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use stereology::pictures::picture_of_solid;
 use stereology::render::{BlockOptions, Camera, RenderError, RenderOptions};
 use stereology::shape::{TriangleMesh, read_mesh};
-use stereology::volume::Solid;
+use stereology::volume::{Solid, turned};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -38,6 +38,9 @@ pub struct Render {
     /// Length in the mesh that one period of the solid takes [default: the mesh's longest side]
     #[arg(long, value_name = "LENGTH", value_parser = positive, requires = "mesh")]
     pub period: Option<f64>,
+    /// Turn the solid in the mesh, or the block, so that flat faces do not show its period
+    #[arg(long)]
+    pub turned: bool,
     /// Direction from the centre to the camera [default: from the front, above]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub camera: Option<Triple>,
@@ -94,21 +97,23 @@ impl Render {
         if self.turntable.is_some() {
             camera = camera.clear_of(&mesh);
         }
+        let place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync) = if self.turned { &turned } else { &|p| *p };
         let step = Step::begin("rendering", everywhere.quiet);
         for (k, file) in files.iter().enumerate() {
             let part = |done: f64| step.at((k as f64 + done) / files.len() as f64);
-            let turned = Camera {
+            let from = Camera {
                 azimuth: camera.azimuth + 360.0 * k as f64 / files.len() as f64,
                 ..camera
             };
-            let picture = picture_of_solid(&solid, &mesh, &turned, &options, &part).map_err(|error| match error {
-                RenderError::Cancelled => Failure::stopped(),
-                RenderError::Options { .. } => Failure::usage(error.to_string()),
-                error => Failure::run(match &self.mesh {
-                    Some(path) => format!("{}: {error}", path.display()),
-                    None => error.to_string(),
-                }),
-            })?;
+            let picture =
+                picture_of_solid(&solid, &mesh, place, &from, &options, &part).map_err(|error| match error {
+                    RenderError::Cancelled => Failure::stopped(),
+                    RenderError::Options { .. } => Failure::usage(error.to_string()),
+                    error => Failure::run(match &self.mesh {
+                        Some(path) => format!("{}: {error}", path.display()),
+                        None => error.to_string(),
+                    }),
+                })?;
             write_png(file, &picture)?;
         }
         drop(step);

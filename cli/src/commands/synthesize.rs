@@ -367,7 +367,15 @@ fn cube(solid: &stereology::volume::Solid) -> Result<RgbImage, Failure> {
     let sides = solid.period().sides();
     let block = TriangleMesh::cuboid(sides.into()).mapped(|p| p + 0.5 * sides);
     let BlockOptions { camera, picture } = BlockOptions::default();
-    picture_of_solid(solid, &block, &camera, &picture, &|_| ControlFlow::Continue(())).or_fail()
+    picture_of_solid(
+        solid,
+        &block,
+        &|p| *p,
+        &camera,
+        &picture,
+        &|_| ControlFlow::Continue(()),
+    )
+    .or_fail()
 }
 
 /// Two pictures of one height side by side.

@@ -4,7 +4,7 @@ use crate::difference::Posed;
 use crate::gauge::{Gauge, Search};
 use crate::neighbours::Neighbours;
 use crate::particles::{ParticleError, check, fraction};
-use crate::separating_axis::best_axis;
+use crate::separating_axis::{best_axis, depth_across_faces};
 use crate::surfaces::{self, Placed, Surface};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -40,12 +40,12 @@ pub struct Packing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Overlap {
-    /// Index of a particle.
+    /// Index of the particle that comes first.
     pub first: usize,
-    /// Index of the other; equal to `first` if a particle meets its own periodic image.
+    /// Index of the other, which comes later; equal to `first` if a particle meets its own periodic image.
     pub second: usize,
-    /// How far one must be moved to part them, along the direction nearest to parting them: exact for spheres, else an upper bound; for bodies that are not convex
-    /// the depth of the deepest crossing face or enclosed point. A length.
+    /// How far one must be moved to part them, along the direction in which they would part first if they shrank, or across a face of either: exact for spheres
+    /// and for boxes that are aligned, else an upper bound; for bodies that are not convex the depth of the deepest crossing face or enclosed point. A length.
     pub depth: f64,
 }
 
@@ -258,7 +258,11 @@ pub fn overlaps(
                     rotation: &turns[i],
                 };
                 let depth = depth(&placed(first), &placed(second), &offset);
-                (depth > 0.0).then_some(Overlap { first, second, depth })
+                (depth > 0.0).then_some(Overlap {
+                    first: first.min(second),
+                    second: first.max(second),
+                    depth,
+                })
             })
         })
         .collect();
@@ -319,7 +323,10 @@ fn depth(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> f64 {
         }
         value = value.max(quotient);
     }
-    ((1.0 - value) * gauge.width).max(f64::MIN_POSITIVE)
+    let depth = (1.0 - value) * gauge.width;
+    depth_across_faces(&hull_a, &hull_b, offset)
+        .map_or(depth, |across| across.min(depth))
+        .max(f64::MIN_POSITIVE)
 }
 
 /// Whether the bodies lie apart in a direction, computed from their support points in world axes and nothing else.

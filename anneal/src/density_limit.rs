@@ -8,12 +8,15 @@ use stereology_shape::{BodyKind, Particle, UnitBody};
 /// # Formula
 ///
 /// ```text
-/// 1 − (1 − δ)^(1 + ln ρ / ln 2.4),     ρ = largest over smallest diameter at equal volume
+/// least of   Δ(δ, ρ)   and   Δ(.7405, ρ of the balls) / (volume of the balls / volume of the bodies),      Δ(δ, ρ) = 1 − (1 − δ)^(1 + ln ρ / ln 2.4)
 /// ```
 ///
 /// `δ` is the densest packing of equal bodies: π/√18 = .7405 for spheres (Hales 2005, a theorem), .7707 for ellipsoids (Donev et al. 2004, the densest
-/// known), 1 for others (bricks fill space; only more than all of it is refused). Smaller spheres fit between larger ones from a ratio of about 2.4 (1 / .414, the octahedral hole), and can then fill
-/// the rest as densely again. With a mixture of kinds the largest `δ` counts. Random packings end well below: about .64 for equal spheres.
+/// known), 1 for others (bricks fill space). `ρ` is the largest over the smallest diameter, at equal volume: smaller spheres fit between larger ones from a
+/// ratio of about 2.4 (1 / .414, the octahedral hole), and can then fill the rest as densely again. With a mixture of kinds the largest `δ` counts.
+///
+/// The balls are those held by the bodies, about their centroids: they cannot be packed more densely than balls (Torquato & Jiao 2009, eq. 6), which binds whatever is
+/// nearly round: a mesh of a sphere, a dodecahedron at .98. Random packings end well below all this: about .64 for equal spheres.
 ///
 /// # Examples
 ///
@@ -28,24 +31,57 @@ use stereology_shape::{BodyKind, Particle, UnitBody};
 /// ```
 #[must_use]
 pub fn density_limit(bodies: &[UnitBody], particles: &[Particle]) -> f64 {
-    let (mut densest, mut smallest, mut largest) = (0.0_f64, f64::INFINITY, 0.0_f64);
+    let (mut densest, mut volume, mut of_balls) = (0.0_f64, 0.0, 0.0);
+    let (mut diameters, mut balls) = (Range::EMPTY, Range::EMPTY);
     for particle in particles {
         let Some(body) = bodies.get(particle.shape) else {
             continue;
         };
         let density = match body.body().kind() {
-            BodyKind::Sphere { .. } => PI / (3.0 * SQRT_2),
+            BodyKind::Sphere { .. } => SPHERES,
             BodyKind::Ellipsoid { .. } => 0.7707,
             _ => 1.0,
         };
         densest = densest.max(density);
-        let diameter = particle.size * body.volume().cbrt();
-        smallest = smallest.min(diameter);
-        largest = largest.max(diameter);
+        diameters.widen(particle.size * body.volume().cbrt());
+        let ball = particle.size * body.inscribed_radius().max(0.0);
+        balls.widen(ball);
+        volume += body.volume() * particle.size.powi(3);
+        of_balls += 4.0 / 3.0 * PI * ball.powi(3);
     }
-    if largest == 0.0 {
+    if volume <= 0.0 {
         return 1.0;
     }
-    let generations = 1.0 + (largest / smallest).ln() / 2.4_f64.ln();
-    1.0 - (1.0 - densest).powf(generations)
+    let mut limit = diameters.filled(densest);
+    if balls.smallest > 0.0 {
+        limit = limit.min(balls.filled(SPHERES) * volume / of_balls);
+    }
+    limit
+}
+
+/// Kepler's packing of equal spheres.
+const SPHERES: f64 = PI / (3.0 * SQRT_2);
+
+/// The smallest and the largest of some lengths.
+struct Range {
+    smallest: f64,
+    largest: f64,
+}
+
+impl Range {
+    const EMPTY: Self = Self {
+        smallest: f64::INFINITY,
+        largest: 0.0,
+    };
+
+    fn widen(&mut self, length: f64) {
+        self.smallest = self.smallest.min(length);
+        self.largest = self.largest.max(length);
+    }
+
+    /// What bodies of these sizes fill, if equal ones fill `alone`.
+    fn filled(&self, alone: f64) -> f64 {
+        let generations = 1.0 + (self.largest / self.smallest).ln() / 2.4_f64.ln();
+        1.0 - (1.0 - alone).powf(generations)
+    }
 }

@@ -21,7 +21,7 @@ pub struct SectionTest {
     pub profiles: Vec<f64>,
     /// What random places show in each bin, on average.
     pub expected: Vec<f64>,
-    /// Σ (profiles − expected)² / expected.
+    /// Σ (profiles − m)² / m, where m is the mean of the packing and all random arrangements.
     pub statistic: f64,
     /// Share of random arrangements whose statistic is as large, (1 + those) / (1 + all). Packed particles keep apart, so their counts vary less: large values
     /// are usual, small ones tell that sections misrepresent the sizes.
@@ -33,6 +33,9 @@ const STREAM: u64 = 24;
 
 /// Cuts a packing by `planes` whole planes across each axis, at even depths from a random first one, and holds the sizes of the profiles against those of
 /// `replicates` random arrangements of the same particles, cut likewise.
+///
+/// The packing counts as one arrangement among the random ones when means are taken: of particles without any arrangement of their own, every rank is then as
+/// likely as any other, and `p_value` is below a number `k / (1 + replicates)` with just that probability.
 ///
 /// No plane's formula is trusted: the arrangements are Monte Carlo's, so particles of any shape are judged alike. Cost: (1 + replicates) × sections.
 ///
@@ -79,8 +82,11 @@ pub fn section_test(packing: &Packing, planes: usize, replicates: usize, seed: u
     let expected: Vec<f64> = (0..BINS)
         .map(|bin| random.iter().map(|counts| counts[bin]).sum::<f64>() / replicates.max(1) as f64)
         .collect();
+    let pooled: Vec<f64> = (0..BINS)
+        .map(|bin| (profiles[bin] + replicates as f64 * expected[bin]) / (1 + replicates) as f64)
+        .collect();
     let statistic = |counts: &[f64]| {
-        let terms = counts.iter().zip(&expected).filter(|(_, e)| **e > 0.0);
+        let terms = counts.iter().zip(&pooled).filter(|(_, e)| **e > 0.0);
         terms.map(|(o, e)| (o - e).powi(2) / e).sum::<f64>()
     };
     let own = statistic(&profiles);

@@ -11,6 +11,7 @@ mod manual;
 mod numbers;
 mod outputs;
 mod particle_files;
+mod particle_surfaces;
 mod profile_table;
 mod progress;
 mod report;

@@ -13,7 +13,8 @@ use crate::failure::{Explain, Failure};
 pub enum ParticleFormat {
     /// `shape,size,category,x,y,z,qw,qx,qy,qz`
     Csv,
-    /// Extended XYZ with the box as lattice; orientation x, y, z, w and semi-axes of ellipsoids as OVITO wants them.
+    /// Extended XYZ with the box as lattice; orientation x, y, z, w and semi-axes of ellipsoids as OVITO wants them. The species is `X`, no element: readers made for
+    /// atoms (ASE) refuse names that are none.
     Xyz,
     /// VTK poly data with a point a particle, for glyphs; orientation w, x, y, z.
     Vtp,
@@ -70,7 +71,7 @@ fn xyz(out: &mut impl Write, bodies: &[UnitBody], period: &PeriodicBox, particle
     writeln!(out, "{}", particles.len())?;
     writeln!(
         out,
-        "Lattice=\"{} 0 0 0 {} 0 0 0 {}\" Origin=\"0 0 0\" pbc=\"T T T\" Properties=species:S:1:pos:R:3:radius:R:1:orientation:R:4:aspherical_shape:R:3:category:I:1",
+        "Lattice=\"{} 0 0 0 {} 0 0 0 {}\" Origin=\"0 0 0\" pbc=\"T T T\" Properties=species:S:1:pos:R:3:radius:R:1:orientation:R:4:aspherical_shape:R:3:shape:I:1:category:I:1",
         sides.x, sides.y, sides.z
     )?;
     particles.iter().try_for_each(|particle| {
@@ -85,7 +86,7 @@ fn xyz(out: &mut impl Write, bodies: &[UnitBody], period: &PeriodicBox, particle
         };
         writeln!(
             out,
-            "S{shape} {} {} {} {} {} {} {} {} {} {} {} {category}",
+            "X {} {} {} {} {} {} {} {} {} {} {} {shape} {category}",
             p.x,
             p.y,
             p.z,
@@ -192,7 +193,7 @@ mod tests {
         let out = text(out);
         assert!(
             out.starts_with("1\nLattice=\"4 0 0 0 5 0 0 0 6\"")
-                && out.ends_with("S0 1 2 3 0.75 0 0 0 1 0.75 0.75 0.375 2\n"),
+                && out.ends_with("X 1 2 3 0.75 0 0 0 1 0.75 0.75 0.375 0 2\n"),
             "{out}"
         );
         let mut out = Vec::new();

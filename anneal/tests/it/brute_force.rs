@@ -24,7 +24,8 @@ pub(crate) fn sphere_overlaps(particles: &[Particle], period: &PeriodicBox) -> V
     found
 }
 
-fn periods(most: i32) -> impl Iterator<Item = [i32; 3]> {
+/// All periods up to so many away along each axis.
+pub(crate) fn periods(most: i32) -> impl Iterator<Item = [i32; 3]> {
     let range = -most..=most;
     range.clone().flat_map(move |x| {
         let range = range.clone();

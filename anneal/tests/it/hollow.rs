@@ -11,7 +11,7 @@ use stereology_anneal::{
 use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation};
 
 /// An L of three unit cubes in one plane: a prism over its outline.
-fn bracket() -> UnitBody {
+pub(crate) fn bracket() -> UnitBody {
     let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
     let vertices = [0.0, 1.0]
         .iter()

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails says where")]
 
+mod all_images;
 mod brute_force;
 mod hollow;
 mod modes;

@@ -68,8 +68,28 @@ fn threads_change_no_bit_in_any_mode() {
         let options = PackOptions::default().with_mode(mode);
         pool.install(|| packed(&mixture(), 100, 0.2, &options).unwrap().into_particles())
     };
-    for mode in [Mode::Paper, Mode::Anneal, Mode::Sequential] {
+    for mode in MODES {
         assert_eq!(run(1, mode), run(2, mode), "{mode:?}");
+    }
+}
+
+/// So many particles that threads share them, of every kind: spheres, rocks with ellipsoids, and bodies moved by parts.
+#[test]
+fn threads_change_no_bit_of_any_shape() {
+    let kinds: [(Vec<UnitBody>, usize, f64); 3] = [
+        (mixture()[..1].to_vec(), 2100, 0.3),
+        (mixture(), 600, 0.25),
+        (vec![crate::hollow::bracket()], 520, 0.15),
+    ];
+    let run = |threads: usize, mode: Mode, (bodies, count, fraction): &(Vec<UnitBody>, usize, f64)| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = PackOptions::default().with_mode(mode);
+        pool.install(|| packed(bodies, *count, *fraction, &options).unwrap().into_particles())
+    };
+    for kind in &kinds {
+        for mode in [Mode::Fast, Mode::Paper] {
+            assert_eq!(run(1, mode, kind), run(2, mode, kind), "{mode:?}");
+        }
     }
 }
 

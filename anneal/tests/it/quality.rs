@@ -78,11 +78,13 @@ fn packings_are_disordered_and_isotropic() {
     let packing = packed(&sphere(), 1000, 0.3, 0.6, 3);
     let order = bond_order(packing.particles(), packing.period(), 1.2);
     assert!(order.bonds > 2000);
-    // Bonds about a particle keep apart, so their mean varies a little more than that of independent ones.
-    assert!(order.global < 5.0 / (order.bonds as f64).sqrt(), "{order:?}");
+    // Of independent bonds one packing in a million exceeds 2.05 / √bonds (χ² of 13 degrees of freedom above 54.6); those about a particle keep apart, so theirs varies
+    // more: .5 to 1.5 over fifty packings, against .97 ± .19 expected.
+    assert!(order.global < 3.0 / (order.bonds as f64).sqrt(), "{order:?}");
     let rods = [UnitBody::new(&Body::cuboid([1.0, 1.0, 4.0]).unwrap())];
     let packing = packed(&rods, 300, 0.2, 0.25, 3);
     let tensor = orientation_tensor(packing.particles(), &Vector3::z()).unwrap();
+    // One in a million: χ² of 5 degrees of freedom.
     assert!(tensor.bingham < 35.9, "{tensor:?}");
     let aligned: Vec<Particle> = packing
         .particles()
@@ -102,6 +104,7 @@ fn sections_show_what_was_packed() {
     for bodies in [sphere(), [UnitBody::new(&Body::rock(2))]] {
         let packing = packed(&bodies, 400, 0.3, 0.45, 4);
         let test = section_test(&packing, 8, 99, 0);
+        // Packed particles keep apart: counts vary less than random ones, of which two in a hundred would be told off here.
         assert!(test.p_value > 0.02, "{test:?}");
         let widths: f64 = packing
             .particles()
@@ -118,6 +121,70 @@ fn sections_show_what_was_packed() {
             "{test:?} {expected}"
         );
     }
+}
+
+/// Particles without any order are what every statistic is held against: each must give what probability says it gives.
+///
+/// A hundred arrangements of 500: means of Bingham's statistic (χ² of 5 degrees) and of bonds × Q6² × 13 (χ² of 13, nearly: bonds that share a particle are independent) lie within 4.9
+/// of their standard deviations; each of twenty bins of g(r) within 5.4 of Poisson's (of twenty bins one false alarm in 10⁶ or fewer).
+#[test]
+fn statistics_of_independent_particles_are_calibrated() {
+    let period = PeriodicBox::new(Vector3::new(9.0, 8.0, 7.0)).unwrap();
+    let grains = mix(&[1.0; 500], &[1.0], 0).unwrap();
+    let (mut bingham, mut order, mut pairs, mut expected) = (0.0, 0.0, vec![0_u64; 20], vec![0.0; 20]);
+    for seed in 0..100 {
+        let particles = populate(&grains, &period, seed);
+        bingham += orientation_tensor(&particles, &Vector3::y()).unwrap().bingham / 100.0;
+        let bonds = bond_order(&particles, &period, 0.6);
+        order += bonds.bonds as f64 * bonds.global.powi(2) / 100.0;
+        let radial = radial_distribution(&particles, &period, Distance::Centres, 2.0, 20);
+        for bin in 0..20 {
+            pairs[bin] += radial.pairs[bin];
+            expected[bin] += radial.pairs[bin] as f64 / radial.g[bin].max(1e-9);
+        }
+    }
+    assert!((bingham - 5.0).abs() < 4.9 * (10.0_f64 / 100.0).sqrt(), "{bingham}");
+    assert!((order - 1.0).abs() < 4.9 * (2.0_f64 / 13.0 / 100.0).sqrt(), "{order}");
+    for (bin, (pairs, expected)) in pairs.iter().zip(expected).enumerate().skip(1) {
+        let apart = (*pairs as f64 - expected) / expected.sqrt();
+        assert!(apart.abs() < 5.4, "{bin}: {pairs} {expected}");
+    }
+}
+
+/// Of particles so few that they are where they are, one in ten has a p of .1 or less: of 200, fewer than 3 or more than 44 once in a million.
+/// Planes that fit the layers of a lattice cut every ball at one height, and are found out.
+#[test]
+fn the_section_test_is_calibrated_and_sees_layers() {
+    let bodies = sphere();
+    let grains = mix(&lognormal_sizes(120, 0.3, 1).unwrap(), &[1.0], 1).unwrap();
+    let period = box_for_fraction(&bodies, &grains, 0.002).unwrap();
+    let low = (0..200)
+        .filter(|seed| {
+            let packing = pack(
+                &bodies,
+                populate(&grains, &period, *seed),
+                &period,
+                &PackOptions::default(),
+                &|_| ControlFlow::Continue(()),
+            );
+            section_test(&packing.unwrap(), 20, 19, *seed).p_value < 0.101
+        })
+        .count();
+    assert!((3..=44).contains(&low), "{low}");
+    let lattice = (0..216).map(|k| Particle {
+        shape: 0,
+        size: 1.0,
+        category: 0,
+        position: Point3::new(f64::from(k % 6), f64::from(k / 6 % 6), f64::from(k / 36)),
+        orientation: UnitQuaternion::identity(),
+    });
+    let crystal = Packing::verify(
+        &bodies,
+        lattice.collect(),
+        &PeriodicBox::new(Vector3::repeat(6.0)).unwrap(),
+    )
+    .unwrap();
+    assert!((section_test(&crystal, 6, 99, 0).p_value - 0.01).abs() < 1e-9);
 }
 
 proptest! {

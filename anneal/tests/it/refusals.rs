@@ -4,9 +4,10 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_anneal::{
-    Mode, PackError, PackOptions, Packing, ParticleError, VerifyError, box_for_fraction, mix, pack, populate,
+    Mode, PackError, PackOptions, Packing, ParticleError, VerifyError, box_for_fraction, density_limit, mix, pack,
+    populate,
 };
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
 
 fn sphere() -> UnitBody {
     UnitBody::new(&Body::sphere(1.0).unwrap())
@@ -36,6 +37,29 @@ fn more_than_the_densest_is_refused_at_once() {
         try_pack(&[sphere()], 500, 0.75, &PackOptions::default()),
         Err(PackError::TooDense { .. })
     ));
+}
+
+/// Whatever holds a ball cannot be packed more densely than the balls: .7405 over their share of the volume.
+#[test]
+fn what_is_nearly_round_is_refused_nearly_as_soon() {
+    let round = ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3)).unwrap();
+    let round = UnitBody::new(&Body::from_mesh(round));
+    let Err(PackError::TooDense { limit, .. }) = try_pack(&[round], 50, 0.78, &PackOptions::default()) else {
+        panic!("packed at .78")
+    };
+    assert!((0.7405..0.77).contains(&limit), "{limit}");
+    // Two kinds, of which one is round: between the two.
+    let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
+    let limit = |bodies: &[UnitBody]| {
+        let grains = mix(&[1.0; 40], &vec![1.0; bodies.len()], 0).unwrap();
+        density_limit(
+            bodies,
+            &populate(&grains, &PeriodicBox::new(Vector3::repeat(9.0)).unwrap(), 0),
+        )
+    };
+    assert!((limit(&[sphere()]) - 0.7405).abs() < 1e-4);
+    assert!((limit(std::slice::from_ref(&cube)) - 1.0).abs() < 1e-12);
+    assert!((0.75..=1.0).contains(&limit(&[sphere(), cube])));
 }
 
 #[test]

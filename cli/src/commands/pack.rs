@@ -20,6 +20,7 @@ use crate::failure::{Explain, Failure, body};
 use crate::numbers::{percent, significant};
 use crate::outputs::{check_file, write_png, write_text};
 use crate::particle_files::ParticleFormat;
+use crate::particle_surfaces;
 use crate::profile_table::read_profiles;
 use crate::progress::{Step, go_on};
 use crate::values::{BoxSides, ShapeShare, count, positive, share, shares};
@@ -67,9 +68,12 @@ pub struct Pack {
     /// File for the packing (JSON)
     #[arg(short, long, value_name = "packing.json")]
     pub output: PathBuf,
-    /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView); may be repeated
+    /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView, a point a particle); may be repeated
     #[arg(long, value_name = "FILE")]
     pub also: Vec<PathBuf>,
+    /// Also write the particles' surfaces for ParaView, every face with its particle's number, size, shape and category
+    #[arg(long, value_name = "packing.vtp")]
+    pub surfaces: Option<PathBuf>,
     /// Also draw the packing (PNG)
     #[arg(long, value_name = "PNG")]
     pub picture: Option<PathBuf>,
@@ -190,7 +194,10 @@ impl Pack {
             return Err(Failure::usage("--tolerance: a share from 0.005 to 1 is needed"));
         }
         check_file(&self.output, everywhere.force)?;
-        for path in self.picture.iter().chain(&self.trace) {
+        if let Some(path) = &self.surfaces {
+            particle_surfaces::check_ending(path)?;
+        }
+        for path in self.picture.iter().chain(&self.trace).chain(&self.surfaces) {
             check_file(path, everywhere.force)?;
         }
         let also = self
@@ -223,6 +230,9 @@ impl Pack {
         go_on()?;
         for (path, format) in also {
             format.write(path, packing.bodies(), &period, packing.particles())?;
+        }
+        if let Some(path) = &self.surfaces {
+            particle_surfaces::write(path, packing.bodies(), packing.particles())?;
         }
         if let Some(path) = &self.picture {
             write_png(path, &pack_quality::picture(&packing).or_fail()?)?;

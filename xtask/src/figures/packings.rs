@@ -38,11 +38,16 @@ pub fn draw(folder: &Path) -> Result<()> {
         let packing = packed(&sphere, COUNT, FRACTION, &options)?;
         // Times are told, not written: the same program draws the same files.
         println!("  {name}: {:.2} s", started.elapsed().as_secs_f64());
-        picture(&packing, &folder.join(format!("packing-{name}.png")))?;
+        picture(
+            &packing,
+            &by_contacts(&packing),
+            &folder.join(format!("packing-{name}.png")),
+        )?;
         rows.push(judged(name, &packing));
         curves.push((name, radial(&packing), colour));
         if mode == Mode::Fast {
             let later = equilibrate(&packing, 300, 0, &|_| ControlFlow::Continue(()))?;
+            picture(&later, &by_contacts(&later), &folder.join("packing-equilibrium.png"))?;
             rows.push(judged("equilibrium", &later));
             curves.push(("equilibrium", radial(&later), GREY));
         }
@@ -58,6 +63,7 @@ pub fn draw(folder: &Path) -> Result<()> {
             "g_below_1.05",
             "q6",
             "bonds",
+            "touching",
         ],
         &rows,
     )?;
@@ -95,7 +101,7 @@ pub fn draw(folder: &Path) -> Result<()> {
     let started = Instant::now();
     let packing = packed(&bodies, 300, 0.2, &PackOptions::default())?;
     println!("  hollow: {:.2} s", started.elapsed().as_secs_f64());
-    picture(&packing, &folder.join("packing-hollow.png"))
+    picture(&packing, &by_shape(&packing), &folder.join("packing-hollow.png"))
 }
 
 fn packed(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOptions) -> Result<Packing> {
@@ -123,21 +129,63 @@ fn judged(name: &str, packing: &Packing) -> Vec<String> {
         format!("{:.2}", radial.g[near]),
         format!("{:.4}", order.global),
         order.bonds.to_string(),
+        format!(
+            "{:.2}",
+            touching(packing).iter().sum::<usize>() as f64 / packing.particles().len() as f64
+        ),
     ]
 }
 
-fn picture(packing: &Packing, path: &Path) -> Result<()> {
+/// Colours of the particles by their shape.
+fn by_shape(packing: &Packing) -> Vec<[f32; 3]> {
     const COLOURS: [[f32; 3]; 3] = [[0.74, 0.45, 0.30], [0.35, 0.50, 0.66], [0.60, 0.62, 0.40]];
-    let colour = |i: usize| {
+    let colour = |(i, shape): (usize, usize)| {
         let shade = 0.82 + 0.36 * (i as f32 * 0.618_034).fract();
-        let base = COLOURS[packing.particles()[i].shape % COLOURS.len()];
-        base.map(|channel| (channel * shade).min(1.0))
+        COLOURS[shape % COLOURS.len()].map(|channel| (channel * shade).min(1.0))
     };
+    packing
+        .particles()
+        .iter()
+        .map(|p| p.shape)
+        .enumerate()
+        .map(colour)
+        .collect()
+}
+
+/// Two spheres touch, for a picture, if less than this part of their mean size lies between them.
+const TOUCHING: f64 = 0.03;
+
+/// Colours of spheres by how many others touch them: none blue, one pale, two, three, four or more red.
+fn by_contacts(packing: &Packing) -> Vec<[f32; 3]> {
+    const COLOURS: [[f32; 3]; 5] = [
+        [0.23, 0.42, 0.70],
+        [0.66, 0.78, 0.88],
+        [0.95, 0.87, 0.62],
+        [0.92, 0.58, 0.34],
+        [0.70, 0.16, 0.16],
+    ];
+    touching(packing).into_iter().map(|n| COLOURS[n.min(4)]).collect()
+}
+
+/// How many spheres touch each one.
+fn touching(packing: &Packing) -> Vec<usize> {
+    let particles = packing.particles();
+    let touch = |i: usize, j: usize| {
+        let (p, q) = (&particles[i], &particles[j]);
+        let apart = packing.period().nearest(q.position - p.position).norm();
+        i != j && apart < 0.5 * (p.size + q.size) * (1.0 + TOUCHING)
+    };
+    (0..particles.len())
+        .map(|i| (0..particles.len()).filter(|&j| touch(i, j)).count())
+        .collect()
+}
+
+fn picture(packing: &Packing, colours: &[[f32; 3]], path: &Path) -> Result<()> {
     let options = RenderOptions {
         gloss: 0.15,
         ..RenderOptions::default().with_size(420, 380)
     };
-    Ok(picture_of_packing(packing, &colour, &options)?.save(path)?)
+    Ok(picture_of_packing(packing, &|i| colours[i], &options)?.save(path)?)
 }
 
 fn lines(path: &Path, curves: &[(&str, RadialDistribution, RGBColor)]) -> Result<()> {

@@ -35,7 +35,7 @@ pub(crate) fn best_axis(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>) -> Optio
 pub(crate) fn depth_across_faces(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>) -> Option<f64> {
     const FACES: usize = 200;
     let mut least = f64::INFINITY;
-    for (posed, outwards) in [(a, 1.0), (b, -1.0)] {
+    for (posed, other, outwards) in [(a, b, 1.0), (b, a, -1.0)] {
         let Solid::Body(body) = posed.solid else { return None };
         let hull = body.mesh()?.hull();
         if hull.triangles.len() > FACES {
@@ -46,8 +46,9 @@ pub(crate) fn depth_across_faces(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>)
             let Some(normal) = (q - p).cross(&(r - p)).try_normalize(0.0) else {
                 continue;
             };
-            let normal = posed.rotation * normal * outwards;
-            least = least.min(a.reach(&normal) + b.reach(&-normal) - normal.dot(d));
+            let own = posed.size * normal.dot(&p.coords);
+            let normal = posed.rotation * normal;
+            least = least.min(own + other.reach(&-normal) - outwards * normal.dot(d));
         }
     }
     Some(least)

@@ -28,7 +28,7 @@ fn packed(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox, opt
 
 fn packs(c: &mut Criterion) {
     let sphere = [UnitBody::new(&Body::sphere(1.0).expect("a sphere"))];
-    let rock = [UnitBody::new(&Body::rock(1))];
+    let rock = [UnitBody::new(&Body::rock(24))];
     let ellipsoid = [UnitBody::new(&Body::ellipsoid([1.0, 0.8, 0.6]).expect("an ellipsoid"))];
     let mut group = c.benchmark_group("pack");
     group
@@ -39,7 +39,7 @@ fn packs(c: &mut Criterion) {
         ("spheres 1000 at .60", &sphere, 1000, 0.6),
         ("spheres 1000 at .64", &sphere, 1000, 0.64),
         ("spheres 10000 at .30", &sphere, 10_000, 0.3),
-        ("rocks 1000 at .50", &rock, 1000, 0.5),
+        ("rocks of 20 vertices, 1000 at .50", &rock, 1000, 0.5),
         ("ellipsoids 1000 at .50", &ellipsoid, 1000, 0.5),
     ] {
         let (particles, period) = start(bodies, count, fraction);
@@ -47,28 +47,28 @@ fn packs(c: &mut Criterion) {
             b.iter(|| packed(bodies, &particles, &period, &PackOptions::default()));
         });
     }
-    let (particles, period) = start(&sphere, 1000, 0.3);
+    let (particles, period) = start(&sphere, 200, 0.3);
     for (name, mode) in [
-        ("spheres 1000 at .30, paper", Mode::Paper),
-        ("spheres 1000 at .30, anneal", Mode::Anneal),
-        ("spheres 1000 at .30, sequential", Mode::Sequential),
+        ("spheres 200 at .30, paper", Mode::Paper),
+        ("spheres 200 at .30, anneal", Mode::Anneal),
+        ("spheres 200 at .30, sequential", Mode::Sequential),
     ] {
         let options = PackOptions::default().with_mode(mode);
         group.bench_function(name, |b| {
             b.iter(|| packed(&sphere, &particles, &period, &options));
         });
     }
-    let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.7, 24, 12)).expect("a closed mesh");
+    let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.7, 16, 8)).expect("a closed mesh");
     let ring = [UnitBody::new(&Body::from_mesh(ring))];
-    let (particles, period) = start(&ring, 100, 0.2);
-    group.bench_function("rings 100 at .20", |b| {
+    let (particles, period) = start(&ring, 60, 0.2);
+    group.bench_function("rings 60 at .20", |b| {
         b.iter(|| packed(&ring, &particles, &period, &PackOptions::default()));
     });
     group.finish();
 }
 
 fn certificates(c: &mut Criterion) {
-    let rock = [UnitBody::new(&Body::rock(1))];
+    let rock = [UnitBody::new(&Body::rock(24))];
     let (particles, period) = start(&rock, 1000, 0.5);
     let packing = packed(&rock, &particles, &period, &PackOptions::default());
     let mut group = c.benchmark_group("overlaps");

@@ -4,6 +4,7 @@
 //! Python script of our own next to it, run by the interpreter that `--python` names; where the peer is not installed, the section says so and has
 //! our times alone.
 
+mod packing;
 mod section_law;
 
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use rayon::ThreadPool;
 use serde_json::Value;
 
 /// What is measured, in the order of the report.
-const SECTIONS: [fn(&Bench) -> Result<Section>; 1] = [section_law::measure];
+const SECTIONS: [fn(&Bench) -> Result<Section>; 2] = [section_law::measure, packing::measure];
 
 /// Our tasks against one peer's.
 struct Section {

@@ -3,9 +3,7 @@
 use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
-use stereology::anneal::{
-    Grain, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, pack, populate,
-};
+use stereology::anneal::{Grain, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, pack, populate};
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
 
 use super::{Bench, Row, Section};
@@ -15,7 +13,14 @@ const SIGMA: f64 = 0.3;
 
 pub fn measure(bench: &Bench) -> Result<Section> {
     let ball = UnitBody::new(&Body::sphere(1.0)?);
-    let spheres = [(1000, 0.3), (1000, 0.5), (1000, 0.6), (1000, 0.64), (10_000, 0.3), (10_000, 0.6)];
+    let spheres = [
+        (1000, 0.3),
+        (1000, 0.5),
+        (1000, 0.6),
+        (1000, 0.64),
+        (10_000, 0.3),
+        (10_000, 0.6),
+    ];
     let sizes = spheres
         .iter()
         .map(|&(count, _)| lognormal_sizes(count, SIGMA, 1))
@@ -38,7 +43,11 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         let (peer, theirs) = match (&answer, place) {
             (Ok(answer), Some(place)) => {
                 let row = &answer["rows"][place];
-                let number = |name: &str| row[name].as_f64().with_context(|| format!("the peer's {name} is no number"));
+                let number = |name: &str| {
+                    row[name]
+                        .as_f64()
+                        .with_context(|| format!("the peer's {name} is no number"))
+                };
                 (Some(number("seconds")?), format!("{:.4}", number("fraction")?))
             }
             _ => (None, "not asked".to_owned()),

@@ -58,7 +58,7 @@ enum Task {
     },
     /// Times our tasks beside other programs' and writes docs/bench-report.md; run it in release
     BenchReport {
-        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx); without it our times stand alone
+        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx, rtree; spheropack); without it our times stand alone
         #[arg(long)]
         python: Option<PathBuf>,
     },

@@ -84,7 +84,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         title: "Packing",
         words: format!(
             "Sizes lognormal, σ {SIGMA}, the same on both sides; a periodic box; random starts to no overlap, ours with its certificate. Theirs: event-driven \
-             growth (Lubachevsky & Stillinger), spheres only; the notes measured .30, .85 and 8.0 s for 1,000 at .5 and .6 and 10,000 at .6."
+             growth (Lubachevsky & Stillinger), spheres only."
         ),
         peer: answer
             .as_ref()

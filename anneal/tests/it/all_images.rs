@@ -26,7 +26,9 @@ fn pairs(
     let reach = |p: &Particle| bodies[p.shape].bounding_radius() * p.size;
     let furthest = particles.iter().map(reach).fold(0.0, f64::max);
     // Centres may lie anywhere in the box, at both ends of a diagonal.
-    let most = (2.0 * furthest / period.sides().min()).ceil() as i32 + 1;
+    let most = (1..)
+        .find(|n| f64::from(n - 1) * period.sides().min() >= 2.0 * furthest)
+        .unwrap();
     let mut found = Vec::new();
     for (i, p) in particles.iter().enumerate() {
         for (j, q) in particles.iter().enumerate().skip(i) {

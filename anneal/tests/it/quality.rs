@@ -79,7 +79,7 @@ fn packings_are_disordered_and_isotropic() {
     let order = bond_order(packing.particles(), packing.period(), 1.2);
     assert!(order.bonds > 2000);
     // Of independent bonds one packing in a million exceeds 2.05 / √bonds (χ² of 13 degrees of freedom above 54.6); those about a particle keep apart, so theirs varies
-    // more: .5 to 1.5 over fifty packings, against .97 ± .19 expected.
+    // more, and the bound is wider.
     assert!(order.global < 3.0 / (order.bonds as f64).sqrt(), "{order:?}");
     let rods = [UnitBody::new(&Body::cuboid([1.0, 1.0, 4.0]).unwrap())];
     let packing = packed(&rods, 300, 0.2, 0.25, 3);

@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 /// Light is averaged over squares of this many places each way.
 const SQUARE: usize = 8;
 /// Rays to the sky for each pixel, at least one a place.
-const SKY_RAYS: usize = 12;
+const SKY_RAYS: usize = 18;
 /// Normals of places that are averaged together agree to this cosine.
 const SAME_NORMAL: f64 = 0.95;
 

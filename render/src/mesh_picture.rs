@@ -17,6 +17,8 @@ use stereology_shape::TriangleMesh;
 const MOST_PIXELS: u64 = 1 << 28;
 /// Coordinates are below this, and extents above its inverse, so that squares of areas are numbers.
 const LARGEST: f64 = 1e60;
+/// The ground lies this share of the extent below the object, so that light finds its way into voids that stand on it.
+const GAP: f64 = 1e-4;
 /// Edge of a tile in pixels.
 const TILE: usize = 32;
 
@@ -229,7 +231,7 @@ pub fn render_material(
         studio: Studio::new(camera.up, &view.forward),
         colour: material.colour,
         hollows: material.hollows,
-        ground: options.ground.then_some(bottom),
+        ground: options.ground.then_some(bottom - GAP * extent),
         up: camera.up,
         extent,
         middle: nalgebra::center(&low, &high),

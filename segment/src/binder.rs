@@ -4,8 +4,8 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use crate::{
+    distance::distance_transform,
     kmeans::{kmeans, nearest_centre, squared_distance},
-    watershed::distance_transform,
 };
 
 /// Terms of a quadratic surface.

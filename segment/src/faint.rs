@@ -4,10 +4,10 @@ use ndarray::Array2;
 
 use crate::{
     binder::{BinderModel, length},
-    lab::smooth,
+    pieces::connected_pieces,
     refine::half_contrast,
-    regions::{connected_pieces, hysteresis, neighbours8, open},
-    watershed::smooth_field,
+    regions::{hysteresis, neighbours8, open},
+    smoothing::{smooth, smooth_field},
 };
 
 /// Pixels in the side of a cell of the coarse picture.

@@ -4,12 +4,8 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    error::SegmentError,
-    finding::Finding,
-    options::SegmentOptions,
-    profile::distinct,
-    regions::{connected_pieces, neighbours4},
-    segmentation::Segmentation,
+    error::SegmentError, finding::Finding, options::SegmentOptions, pieces::connected_pieces, profile::distinct,
+    regions::neighbours4, segmentation::Segmentation,
 };
 
 /// Pieces from which a map of one or two numbers is a mask.

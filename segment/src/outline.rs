@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::regions::connected_pieces;
+use crate::pieces::connected_pieces;
 
 /// Corners of a closed line, (x, y) in pixels from the photo's upper left corner, the first not repeated at the end.
 pub type Ring = Vec<[f64; 2]>;

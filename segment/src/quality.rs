@@ -5,7 +5,7 @@ use ndarray::Array2;
 use crate::{
     finding::Finding,
     options::{EdgeRule, SegmentOptions},
-    regions::neighbours8,
+    pieces::{Contact, pieces},
     segmentation::Segmentation,
 };
 
@@ -87,26 +87,15 @@ impl Segmentation {
 
 /// Connected regions (8 neighbours) of at least `low`, somewhere `high`, and of an area.
 fn regions(distance: &Array2<f32>, low: f32, high: f32, min_area: usize) -> usize {
-    let mut seen = Array2::from_elem(distance.dim(), false);
-    let mut stack: Vec<[usize; 2]> = Vec::new();
-    let mut count = 0;
-    for ((y, x), z) in distance.indexed_iter() {
-        if *z < high || seen[[y, x]] {
-            continue;
-        }
-        let mut area = 0;
-        seen[[y, x]] = true;
-        stack.push([y, x]);
-        while let Some(p) = stack.pop() {
-            area += 1;
-            for q in neighbours8(p, distance.dim()) {
-                if distance[q] >= low && !seen[q] {
-                    seen[q] = true;
-                    stack.push(q);
-                }
-            }
-        }
-        count += usize::from(area >= min_area);
+    let (pieces, count) = pieces(&distance.mapv(|z| z >= low), |z| z, Contact::Corners);
+    let mut areas = vec![(0_usize, false); count as usize + 1];
+    for (&piece, &z) in pieces.iter().zip(distance) {
+        let (area, strong) = &mut areas[piece as usize];
+        *area += 1;
+        *strong |= z >= high;
     }
-    count
+    areas[1..]
+        .iter()
+        .filter(|(area, strong)| *strong && *area >= min_area)
+        .count()
 }

@@ -1,6 +1,8 @@
-//! Regions of a mask: hysteresis, connected pieces, holes, opening.
+//! Regions of a mask: hysteresis, holes, opening.
 
 use ndarray::Array2;
+
+use crate::pieces::{Contact, connected_pieces, pieces};
 
 /// Pixels of at least `low` that hang together (8 neighbours) with one of at least `high`.
 ///
@@ -13,57 +15,14 @@ use ndarray::Array2;
 /// ```
 #[must_use]
 pub fn hysteresis(distance: &Array2<f32>, low: f32, high: f32) -> Array2<bool> {
-    let candidate = distance.mapv(|z| z >= low);
-    let mut kept = Array2::from_elem(distance.dim(), false);
-    let mut stack: Vec<[usize; 2]> = Vec::new();
-    for ((y, x), z) in distance.indexed_iter() {
-        if *z >= high && !kept[[y, x]] {
-            kept[[y, x]] = true;
-            stack.push([y, x]);
-        }
-        while let Some(p) = stack.pop() {
-            for q in neighbours8(p, distance.dim()) {
-                if candidate[q] && !kept[q] {
-                    kept[q] = true;
-                    stack.push(q);
-                }
-            }
-        }
+    let candidates = distance.mapv(|z| z >= low);
+    let (pieces, count) = pieces(&candidates, |c| c, Contact::Corners);
+    let mut strong = vec![false; count as usize + 1];
+    for (&piece, &z) in pieces.iter().zip(distance) {
+        strong[piece as usize] |= z >= high;
     }
-    kept
-}
-
-/// Connected pieces (4 neighbours) of equal, chosen values: a number from 1 for each, in order of their first pixel, and 0 elsewhere; and how many.
-///
-/// # Examples
-///
-/// ```
-/// use ndarray::array;
-/// let (pieces, count) = stereology_segment::connected_pieces(&array![[7, 7, 0, 7], [0, 3, 0, 0]], |v| v != 0);
-/// assert_eq!((pieces, count), (array![[1, 1, 0, 2], [0, 3, 0, 0]], 3));
-/// ```
-#[must_use]
-pub fn connected_pieces<T: PartialEq + Copy>(values: &Array2<T>, chosen: impl Fn(T) -> bool) -> (Array2<u32>, u32) {
-    let mut pieces = Array2::zeros(values.dim());
-    let mut count = 0;
-    let mut stack = Vec::new();
-    for ((y, x), &value) in values.indexed_iter() {
-        if pieces[[y, x]] != 0 || !chosen(value) {
-            continue;
-        }
-        count += 1;
-        pieces[[y, x]] = count;
-        stack.push([y, x]);
-        while let Some(p) = stack.pop() {
-            for q in neighbours4(p, values.dim()) {
-                if pieces[q] == 0 && values[q] == value {
-                    pieces[q] = count;
-                    stack.push(q);
-                }
-            }
-        }
-    }
-    (pieces, count)
+    strong[0] = false;
+    pieces.mapv(|piece| strong[piece as usize])
 }
 
 /// Fills the holes of a mask: pieces of the outside (4 neighbours) that do not reach the photo's edge and for which `fill(area of the hole, area of the mask around it)` holds, in pixels. The area around a

@@ -11,12 +11,14 @@ use crate::{
     error::SegmentError,
     faint::faint_regions,
     finding::Finding,
-    lab::{encoded_image, lab_image, smooth},
+    lab::{encoded_image, lab_image},
     options::{BinderChoice, Holes, SegmentOptions},
+    pieces::connected_pieces,
     profile::{Index, Profile, Window, measure, size_of_area, weigh},
     quality::LEAST_SHARE,
     refine::half_contrast,
-    regions::{connected_pieces, fill_holes, hysteresis, open},
+    regions::{fill_holes, hysteresis, open},
+    smoothing::smooth,
     split::{fill_label_holes, split_by_colour, split_by_shape},
 };
 

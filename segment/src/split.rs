@@ -1,14 +1,15 @@
 //! A mask into profiles: touching particles of different colours first, then by shape.
 
-use std::collections::BTreeMap;
-
 use ndarray::Array2;
 
 use crate::{
+    cores::{CORE_DEPTH, Cores},
+    distance::distance_transform,
+    hills::Hills,
     kmeans::{kmeans, nearest_centre},
-    refine::core_colours,
-    regions::{connected_pieces, neighbours4},
-    watershed::{distance_transform, h_maxima, smooth_field, watershed},
+    pieces::{connected_pieces, find},
+    regions::neighbours4,
+    smoothing::smooth_field,
 };
 
 /// Colour groups looked for inside the mask.
@@ -25,6 +26,9 @@ const INLET: f64 = 0.35;
 
 /// Share of the lower maximum that two maxima at the photo's edge must stand above their neck.
 const CUT_RISE: f32 = 0.3;
+
+/// Depth, pixels, beyond which necks are of no account; it stands for the infinite depth of a mask without an outside.
+const DEEPEST: f32 = 1e4;
 
 /// What is known of a part of a region.
 #[derive(Clone, Copy, Default)]
@@ -61,7 +65,7 @@ impl Part {
 ///
 /// # Complexity
 ///
-/// Linear in pixels; a few thousand of them are grouped.
+/// Linear in pixels, but for the sorting of parts that touch; a few thousand pixels are grouped.
 ///
 /// # Examples
 ///
@@ -75,71 +79,91 @@ impl Part {
 /// ```
 #[must_use]
 pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -> Array2<u32> {
-    let cores = core_colours(lab, mask, 0);
-    let inside = cores.iter().flatten().count();
+    let cores = Cores::new(lab, mask, 0, CORE_DEPTH);
     let sample: Vec<[f64; 3]> = cores
+        .source
         .iter()
-        .flatten()
-        .step_by((inside / 4000).max(1))
-        .map(|c| c.map(f64::from))
+        .filter_map(|&i| cores.known.get(i as usize))
+        .step_by((cores.source.iter().filter(|&&i| i != u32::MAX).count() / 4000).max(1))
+        .map(|(c, _)| c.map(f64::from))
         .collect();
     let centres = kmeans(&sample, GROUPS, seed).centres;
-    let groups = cores.mapv(|c| c.map_or(0, |c| 1 + nearest_centre(&c.map(f64::from), &centres)));
+    let group = |(c, _): &([f32; 3], f32)| 1 + nearest_centre(&c.map(f64::from), &centres) as u32;
+    let of_core: Vec<u32> = cores.known.iter().map(group).collect();
+    let groups = cores.source.mapv(|i| of_core.get(i as usize).copied().unwrap_or(0));
     let (mut parts, count) = connected_pieces(&groups, |g| g != 0);
-    let depth = distance_transform(&lined(&parts));
-    let mut known = vec![Part::default(); count as usize + 1];
-    let mut borders: BTreeMap<(u32, u32), f64> = BTreeMap::new();
-    for ((y, x), &part) in parts.indexed_iter().filter(|(_, p)| **p != 0) {
-        let c = lab[[y, x]].map(f64::from);
-        let core = depth[[y, x]] >= 1.5;
-        let weight = if core { 1.0 } else { 1e-3 };
-        known[part as usize].add(&Part {
-            sum: c.map(|v| v * weight),
-            squares: c.iter().map(|v| v * v).sum::<f64>() * weight,
-            count: weight,
-            depth: depth[[y, x]],
-            // The photo's edge is no contact.
-            outline: (4 - neighbours4([y, x], parts.dim()).filter(|&q| parts[q] == part).count()) as f64,
-        });
-        for q in neighbours4([y, x], parts.dim()) {
-            let other = parts[q];
-            if other > part {
-                *borders.entry((part, other)).or_default() += 1.0;
-            }
-        }
-    }
+    let (known, borders) = contacts(lab, &parts, count);
     let merged = merge(known, borders);
     parts.mapv_inplace(|p| merged[p as usize]);
     parts
 }
 
+/// Two parts that touch, the smaller number first, and the length of their border, pixel sides.
+type Border = ((u32, u32), u32);
+
+/// What is known of every part, and the borders between them by increasing numbers.
+fn contacts(lab: &Array2<[f32; 3]>, parts: &Array2<u32>, count: u32) -> (Vec<Part>, Vec<Border>) {
+    let (height, width) = parts.dim();
+    let depth = distance_transform(&lined(parts));
+    let mut known = vec![Part::default(); count as usize + 1];
+    let mut borders = Vec::new();
+    let nowhere = vec![0; width];
+    let row = |y: usize| parts.row(y).to_vec();
+    let (mut above, mut here) = (nowhere.clone(), row(0));
+    for y in 0..height {
+        let below = if y + 1 < height { row(y + 1) } else { nowhere.clone() };
+        for ((x, &part), (d, c)) in here.iter().enumerate().zip(depth.row(y).iter().zip(lab.row(y))) {
+            if part == 0 {
+                continue;
+            }
+            let right = here.get(x + 1).copied().unwrap_or(0);
+            let around = [above[x], if x > 0 { here[x - 1] } else { 0 }, right, below[x]];
+            let c = c.map(f64::from);
+            let weight = if *d >= 1.5 { 1.0 } else { 1e-3 };
+            known[part as usize].add(&Part {
+                sum: c.map(|v| v * weight),
+                squares: c.iter().map(|v| v * v).sum::<f64>() * weight,
+                count: weight,
+                depth: *d,
+                // The photo's edge is no contact.
+                outline: around.iter().filter(|&&q| q != part).count() as f64,
+            });
+            for other in [right, below[x]].into_iter().filter(|&q| q != 0 && q != part) {
+                borders.push(((part.min(other), part.max(other)), 1));
+            }
+        }
+        above = std::mem::replace(&mut here, below);
+    }
+    (known, gathered(borders))
+}
+
+/// Borders of the same two parts as one.
+fn gathered(mut borders: Vec<Border>) -> Vec<Border> {
+    borders.sort_unstable_by_key(|b| b.0);
+    borders.dedup_by(|next, first| {
+        let same = next.0 == first.0;
+        first.1 += if same { next.1 } else { 0 };
+        same
+    });
+    borders
+}
+
 /// Joins touching parts, the most alike first, until all that touch differ; the surviving number of each part.
-fn merge(mut known: Vec<Part>, borders: BTreeMap<(u32, u32), f64>) -> Vec<u32> {
+fn merge(mut known: Vec<Part>, mut borders: Vec<Border>) -> Vec<u32> {
     let mut name: Vec<u32> = (0..known.len() as u32).collect();
-    let find = |name: &[u32], mut i: u32| {
-        while name[i as usize] != i {
-            i = name[i as usize];
-        }
-        i
-    };
-    loop {
-        let mut joined = false;
-        let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
-        let mut lengths: BTreeMap<(u32, u32), f64> = BTreeMap::new();
-        for (&(a, b), &length) in &borders {
-            let (a, b) = (find(&name, a), find(&name, b));
-            if a != b {
-                *lengths.entry((a.min(b), a.max(b))).or_default() += length;
-            }
-        }
-        for (&(a, b), &length) in &lengths {
-            if let Some(cost) = unlikeness(&known[a as usize], &known[b as usize], length) {
-                pairs.push((cost, a, b));
-            }
-        }
-        pairs.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    let mut joined = true;
+    while joined {
+        joined = false;
+        let mut pairs: Vec<(f64, u32, u32, u32)> = borders
+            .iter()
+            .filter_map(|&((a, b), length)| {
+                let cost = unlikeness(&known[a as usize], &known[b as usize], f64::from(length))?;
+                Some((cost, a, b, length))
+            })
+            .collect();
+        pairs.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
         let mut touched = vec![false; known.len()];
-        for (_, a, b) in pairs {
+        for (_, a, b, length) in pairs {
             // Costs of parts joined in this round are stale: they wait for the next.
             if touched[a as usize] || touched[b as usize] {
                 continue;
@@ -148,15 +172,18 @@ fn merge(mut known: Vec<Part>, borders: BTreeMap<(u32, u32), f64>) -> Vec<u32> {
             touched[b as usize] = true;
             let part = known[b as usize];
             known[a as usize].add(&part);
-            known[a as usize].outline -= 2.0 * lengths[&(a, b)];
+            known[a as usize].outline -= 2.0 * f64::from(length);
             name[b as usize] = a;
             joined = true;
         }
-        if !joined {
-            break;
+        for ((a, b), _) in &mut borders {
+            let ends = (find(&mut name, *a), find(&mut name, *b));
+            (*a, *b) = (ends.0.min(ends.1), ends.0.max(ends.1));
         }
+        borders.retain(|((a, b), _)| a != b);
+        borders = gathered(borders);
     }
-    (0..known.len() as u32).map(|i| find(&name, i)).collect()
+    (0..known.len() as u32).map(|i| find(&mut name, i)).collect()
 }
 
 /// How little two touching parts belong together; `None` if they are two particles.
@@ -192,7 +219,7 @@ fn lined(parts: &Array2<u32>) -> Array2<bool> {
 ///
 /// # Complexity
 ///
-/// n log n in the pixels of the parts.
+/// Linear in pixels but for the inverse Ackermann function.
 ///
 /// # Examples
 ///
@@ -207,33 +234,21 @@ fn lined(parts: &Array2<u32>) -> Array2<bool> {
 /// ```
 #[must_use]
 pub fn split_by_shape(parts: &Array2<u32>, [least, share]: [f32; 2]) -> Array2<u32> {
-    let mask = lined(parts);
-    let mut depth = smooth_field(&distance_transform(&mask), 1.0);
-    depth.zip_mut_with(&mask, |d, &m| *d = if m { d.min(1e4) } else { 0.0 });
+    // The walk up may start on the lines between parts: their depth is 0 before smoothing.
+    let mut depth = smooth_field(&distance_transform(&lined(parts)).mapv(|d| d.min(DEEPEST)), 1.0);
+    depth.zip_mut_with(parts, |d, &part| *d = if part == 0 { 0.0 } else { *d });
     let (height, width) = parts.dim();
-    let markers = h_maxima(&depth, |[y, x], rise| {
+    Hills::new(&depth, parts, |_| false).divided(|[y, x], rise| {
         // Of a strip cut off by the photo's edge the ridge lies beyond: what is seen of it says little of necks.
         let cut = y == 0 || x == 0 || y + 1 == height || x + 1 == width;
         least.max(if cut { share.max(CUT_RISE) } else { share } * rise)
-    });
-    let mut labels = watershed(&depth, &markers, &mask);
-    // The lines between parts go back to the part they were taken from.
-    for _ in 0..3 {
-        let before = labels.clone();
-        for ((y, x), &part) in parts.indexed_iter() {
-            if part != 0 && before[[y, x]] == 0 {
-                let same = neighbours4([y, x], parts.dim()).find(|&q| parts[q] == part && before[q] != 0);
-                labels[[y, x]] = same.map_or(0, |q| before[q]);
-            }
-        }
-    }
-    labels
+    })
 }
 
 /// Gives holes enclosed by a single label to that label.
 pub(crate) fn fill_label_holes(labels: &mut Array2<u32>) {
-    let (outside, count) = connected_pieces(labels, |l| l == 0);
     const SEVERAL: u32 = u32::MAX;
+    let (outside, count) = connected_pieces(labels, |l| l == 0);
     let mut owner = vec![0_u32; count as usize + 1];
     let (height, width) = labels.dim();
     for ((y, x), &o) in outside.indexed_iter().filter(|(_, o)| **o != 0) {

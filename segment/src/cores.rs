@@ -1,0 +1,234 @@
+//! Cores of regions: the pixels deep enough inside a particle to show its colour unmixed.
+
+use std::collections::VecDeque;
+
+use ndarray::Array2;
+
+use crate::{distance::distance_transform, pieces::connected_pieces};
+
+/// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
+pub(crate) const CORE_DEPTH: f32 = 3.0;
+/// The same for small regions, as a share of the greatest depth within three pixels.
+const CORE_SHARE: f32 = 0.9;
+/// Core pixels around one that its colour is averaged over, in each direction.
+const AROUND: usize = 2;
+/// No core.
+const NONE: u32 = u32::MAX;
+
+/// For each pixel of a mask and of a rim around it, the colour of the particle core it belongs to.
+///
+/// A core pixel lies at least three pixels deep, or in the deeper part of a small region; other pixels take the nearest core's colour, averaged over the core pixels two around. Pixels beyond the rim, `reach`
+/// pixels out of the mask, get `None`.
+///
+/// # Complexity
+///
+/// Linear in pixels.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array2;
+///
+/// let deviation = Array2::from_shape_fn((20, 20), |(_, x)| [x as f32, 0.0, 0.0]);
+/// let mask = Array2::from_shape_fn((20, 20), |(_, x)| x >= 10);
+/// let cores = stereology_segment::core_colours(&deviation, &mask, 1);
+/// assert_eq!(cores[[10, 10]], cores[[10, 12]]); // three pixels deep is pixel 12
+/// assert!(cores[[10, 9]].is_some() && cores[[10, 8]].is_none());
+/// ```
+#[must_use]
+pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8) -> Array2<Option<[f32; 3]>> {
+    let cores = Cores::new(deviation, mask, reach, CORE_DEPTH);
+    Array2::from_shape_fn(mask.dim(), |p| cores.of(p).map(|(colour, _)| colour))
+}
+
+/// The core of every pixel.
+pub(crate) struct Cores {
+    /// The core pixel that each pixel belongs to, or [`NONE`].
+    pub(crate) source: Array2<u32>,
+    /// Core pixels in reading order: colour, and the greatest depth in their piece of the mask.
+    pub(crate) known: Vec<([f32; 3], f32)>,
+}
+
+impl Cores {
+    pub(crate) fn new(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8, core_depth: f32) -> Self {
+        let (height, width) = mask.dim();
+        let depth = distance_transform(mask);
+        let (pieces, count) = connected_pieces(mask, |m| m);
+        let mut largest = vec![0.0_f32; count as usize + 1];
+        for (&piece, &d) in pieces.iter().zip(&depth) {
+            let l = &mut largest[piece as usize];
+            *l = l.max(d);
+        }
+        let mut core = highest_around(&depth, core_depth as usize);
+        core.zip_mut_with(&depth, |c, &d| {
+            *c = f32::from(u8::from(d > 0.0 && (d >= core_depth || d >= CORE_SHARE * *c)));
+        });
+        let mut source = Array2::from_elem((height, width), NONE);
+        let mut known = Vec::new();
+        let mut means = RowMeans::new(deviation, &core);
+        for y in 0..height {
+            let row = core.row(y);
+            let cores = (0..width).filter(|&x| row[x] > 0.0);
+            means.at_row(y, cores, |x, colour| {
+                source[[y, x]] = known.len() as u32;
+                known.push((colour, largest[pieces[[y, x]] as usize]));
+            });
+        }
+        let mut cores = Self { source, known };
+        cores.spread(mask, reach);
+        cores
+    }
+
+    /// Colour of a pixel's core, and the greatest depth in the core's piece of the mask.
+    pub(crate) fn of(&self, p: (usize, usize)) -> Option<([f32; 3], f32)> {
+        self.known.get(self.source[p] as usize).copied()
+    }
+
+    /// Gives every other pixel of the mask and of its rim the nearest core.
+    fn spread(&mut self, mask: &Array2<bool>, reach: u8) {
+        let (height, width) = mask.dim();
+        let mask = mask.as_standard_layout();
+        let (Some(mask), Some(source)) = (mask.as_slice(), self.source.as_slice_mut()) else {
+            return;
+        };
+        let around = |i: usize, x: usize| {
+            [
+                (i >= width).then(|| (i - width, x)),
+                (x > 0).then(|| (i - 1, x.wrapping_sub(1))),
+                (x + 1 < width).then_some((i + 1, x + 1)),
+                (i + width < height * width).then_some((i + width, x)),
+            ]
+        };
+        let mut queue = VecDeque::new();
+        // Only cores at the border of their region have anything to pass on.
+        for y in 0..height {
+            for x in 0..width {
+                let i = y * width + x;
+                if source[i] != NONE && around(i, x).into_iter().flatten().any(|(q, _)| source[q] == NONE) {
+                    queue.push_back((i as u32, x as u32, 0_u8));
+                }
+            }
+        }
+        while let Some((i, x, outside)) = queue.pop_front() {
+            let from = source[i as usize];
+            for (q, column) in around(i as usize, x as usize).into_iter().flatten() {
+                let steps = if mask[q] { 0 } else { outside + 1 };
+                if source[q] == NONE && steps <= reach {
+                    source[q] = from;
+                    queue.push_back((q as u32, column as u32, steps));
+                }
+            }
+        }
+    }
+}
+
+/// The highest value of the square of `radius` around each pixel.
+fn highest_around(field: &Array2<f32>, radius: usize) -> Array2<f32> {
+    let (height, width) = field.dim();
+    let mut across = field.as_standard_layout().into_owned();
+    for (mut out, row) in across.outer_iter_mut().zip(field.outer_iter()) {
+        let (row, Some(out)) = (row.to_vec(), out.as_slice_mut()) else {
+            continue;
+        };
+        for step in 1..=radius.min(width.saturating_sub(1)) {
+            let higher = |(o, v): (&mut f32, &f32)| *o = o.max(*v);
+            out[step..].iter_mut().zip(&row).for_each(higher);
+            out.iter_mut().zip(&row[step..]).for_each(higher);
+        }
+    }
+    let mut out = across.clone();
+    for (y, mut row) in out.outer_iter_mut().enumerate() {
+        for j in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+            row.zip_mut_with(&across.row(j), |o, v| *o = o.max(*v));
+        }
+    }
+    out
+}
+
+/// Means over the core pixels around, row by row: sums along five rows, then down them.
+struct RowMeans<'a> {
+    deviation: &'a Array2<[f32; 3]>,
+    core: &'a Array2<f32>,
+    /// Sums along rows: row y in slot y modulo their number; last the number of pixels.
+    sums: Vec<Vec<[f32; 4]>>,
+    /// Rows summed so far.
+    next: usize,
+}
+
+impl<'a> RowMeans<'a> {
+    fn new(deviation: &'a Array2<[f32; 3]>, core: &'a Array2<f32>) -> Self {
+        let width = core.dim().1;
+        Self {
+            deviation,
+            core,
+            sums: vec![vec![[0.0; 4]; width]; 2 * AROUND + 1],
+            next: 0,
+        }
+    }
+
+    fn at_row(&mut self, y: usize, columns: impl Iterator<Item = usize>, mut put: impl FnMut(usize, [f32; 3])) {
+        let height = self.core.dim().0;
+        let last = (y + AROUND + 1).min(height);
+        while self.next < last {
+            self.sum_row(self.next);
+            self.next += 1;
+        }
+        let slots = self.sums.len();
+        for x in columns {
+            let mut sum = [0.0_f32; 4];
+            for j in y.saturating_sub(AROUND)..last {
+                let row = &self.sums[j % slots][x];
+                (0..4).for_each(|c| sum[c] += row[c]);
+            }
+            put(x, [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]);
+        }
+    }
+
+    fn sum_row(&mut self, y: usize) {
+        let slots = self.sums.len();
+        let out = &mut self.sums[y % slots];
+        out.fill([0.0; 4]);
+        let width = out.len();
+        for ((x, core), d) in self.core.row(y).iter().enumerate().zip(self.deviation.row(y)) {
+            if *core > 0.0 {
+                for o in &mut out[x.saturating_sub(AROUND)..(x + AROUND + 1).min(width)] {
+                    (0..3).for_each(|c| o[c] += d[c]);
+                    o[3] += 1.0;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Core colours are means over the core pixels of a square.
+        #[test]
+        fn means_of_squares(width in 1_usize..14, inside in proptest::collection::vec(proptest::bool::weighted(0.9), 1..200)) {
+            let height = inside.len() / width;
+            let mask = Array2::from_shape_fn((height, width), |(y, x)| inside[y * width + x]);
+            let deviation = Array2::from_shape_fn(mask.dim(), |(y, x)| [(x * 7 + y * 3) as f32 % 11.0, x as f32, 1.0]);
+            let depth = distance_transform(&mask);
+            let square = |y: usize, x: usize, r: usize| {
+                (y.saturating_sub(r)..(y + r + 1).min(height)).flat_map(move |j| (x.saturating_sub(r)..(x + r + 1).min(width)).map(move |i| (j, i)))
+            };
+            let is_core = |(y, x): (usize, usize)| {
+                let deepest = square(y, x, 3).map(|q| depth[q]).fold(0.0, f32::max);
+                mask[(y, x)] && (depth[(y, x)] >= CORE_DEPTH || depth[(y, x)] >= CORE_SHARE * deepest)
+            };
+            let found = core_colours(&deviation, &mask, 0);
+            for (p, _) in mask.indexed_iter().filter(|(p, _)| is_core(*p)) {
+                let around: Vec<[f32; 3]> = square(p.0, p.1, 2).filter(|q| is_core(*q)).map(|q| deviation[q]).collect();
+                for c in 0..3 {
+                    let mean = around.iter().map(|d| d[c]).sum::<f32>() / around.len() as f32;
+                    prop_assert!((found[p].unwrap()[c] - mean).abs() < 1e-4);
+                }
+            }
+            prop_assert!(found.iter().zip(&mask).all(|(f, m)| f.is_none() || *m));
+        }
+    }
+}

@@ -4,12 +4,10 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use crate::{
-    distance::distance_transform,
-    kmeans::{kmeans, nearest_centre, squared_distance},
+    kmeans::kmeans,
+    light::{Sample, Surface, TERMS, colour_at, fit_surface, identity, inverse_factor, place, sample, scatter},
+    tones::GUESSES,
 };
-
-/// Terms of a quadratic surface.
-const TERMS: usize = 6;
 
 /// Robust fit of the binder's colour: a quadratic surface of light in each channel of encoded values, and the scatter around it.
 ///
@@ -25,7 +23,7 @@ const TERMS: usize = 6;
 /// Jagnow, Dorsey & Rushmeier 2004, section 4.2 segments by hand; the trimmed covariance is that of Rousseeuw's reweighting (1987).
 #[derive(Clone, Debug, PartialEq)]
 pub struct BinderModel {
-    surface: [[f64; TERMS]; 3],
+    surface: Surface,
     /// Lower triangular W with Σ⁻¹ = WᵀW.
     whitening: [[f64; 3]; 3],
     size: (usize, usize),
@@ -33,23 +31,8 @@ pub struct BinderModel {
     spread: f64,
 }
 
-/// A pixel of the sample: place in −1..1 and colour.
-#[derive(Clone, Copy)]
-struct Sample {
-    place: [f64; 2],
-    colour: [f64; 3],
-}
-
-/// Distance z of the tones of [`BinderModel::fit_two_tones`].
-pub(crate) const TONE_DISTANCE: f32 = 9.0;
-/// Colours that k-means begins with.
-const GUESSES: usize = 8;
-/// Pixels in the sample, at least, where the photo has as many.
-const SAMPLE: usize = 16_000;
 /// Distance beyond which a pixel does not count as binder while fitting.
 const GATE: f64 = 3.0;
-/// Least standard deviation: half a grey level of an 8-bit picture.
-const LEAST_DEVIATION: f64 = 0.5 / 255.0;
 /// Scatter that is small for a photo: at this, twice the pixels outweigh twice the scatter.
 const WIDE: f64 = 3.0 / 255.0;
 /// Standard deviation around a guess to start from.
@@ -124,7 +107,7 @@ impl BinderModel {
     #[must_use]
     pub fn fit_near(picture: &Array2<[f32; 3]>, colour: [f32; 3]) -> Self {
         let samples = sample(picture);
-        let mut model = Self::flat(colour.map(f64::from), FIRST_DEVIATION, picture.dim());
+        let mut model = Self::flat(colour.map(f64::from), FIRST_DEVIATION, picture.dim(), 0.0);
         let fixed = model.whitening;
         for terms in [1, 3, 3, TERMS, TERMS, TERMS] {
             model.whitening = fixed;
@@ -134,47 +117,6 @@ impl BinderModel {
             }
         }
         model
-    }
-
-    /// For a photo of two tones, such as a tomogram or a thin section, where neither is narrow enough for [`fit`](Self::fit): k-means finds the tones, and the binder is the one in thinner threads. Halfway between
-    /// them lies at z = 4.5, half of what separates them. The second value is the distance of the tones over the sum of their scatters; below about 2 they are not two.
-    ///
-    /// # Examples
-    ///
-    /// ```
-    /// use stereology_segment::{BinderModel, encoded_image};
-    ///
-    /// // Pale squares of 20 pixels, 5 apart, both with strong texture.
-    /// let photo = image::RgbImage::from_fn(100, 100, |x, y| {
-    ///     let level = if x % 25 < 20 && y % 25 < 20 { 160 } else { 60 };
-    ///     image::Rgb([level + ((x * 7919 + y * 104_729) % 41) as u8; 3])
-    /// });
-    /// let picture = encoded_image(&photo);
-    /// let (binder, apart) = BinderModel::fit_two_tones(&picture, 0);
-    /// assert!(apart > 2.0 && binder.distance(&picture)[[10, 10]] > 6.0);
-    /// ```
-    #[must_use]
-    pub fn fit_two_tones(picture: &Array2<[f32; 3]>, seed: u64) -> (Self, f64) {
-        let samples = sample(picture);
-        let colours: Vec<[f64; 3]> = samples.iter().map(|s| s.colour).collect();
-        let tones = kmeans(&colours, 2, seed);
-        let [a, b] = *tones.centres.as_slice() else {
-            return (
-                Self::flat(tones.centres.first().copied().unwrap_or([0.0; 3]), 1.0, picture.dim()),
-                0.0,
-            );
-        };
-        let step = squared_distance(&a, &b).sqrt();
-        let is_a = picture.mapv(|p| nearest_centre(&p.map(f64::from), &[a, b]) == 0);
-        let (thin, group) = if mean_depth(&is_a) <= mean_depth(&is_a.mapv(|m| !m)) {
-            (a, 0)
-        } else {
-            (b, 1)
-        };
-        let spread = (tones.inertia / samples.len() as f64).sqrt();
-        let mut model = Self::flat(thin, step / f64::from(TONE_DISTANCE), picture.dim());
-        model.share = tones.assignment.iter().filter(|g| **g == group).count() as f64 / samples.len() as f64;
-        (model, step / (2.0 * spread))
     }
 
     /// This binder's light and scatter fitted again to a picture of the same scene, such as one at another scale; pixels that are not numbers are left out.
@@ -235,18 +177,18 @@ impl BinderModel {
         }
         self.surface = fit_surface(&inside, terms);
         self.share = inside.len() as f64 / samples.len() as f64;
-        (self.whitening, self.spread) = scatter(self, &inside);
+        (self.whitening, self.spread) = scatter(&self.surface, &inside);
         true
     }
 
     /// A binder of one colour and the same scatter in each channel.
-    fn flat(colour: [f64; 3], deviation: f64, size: (usize, usize)) -> Self {
+    pub(crate) fn flat(colour: [f64; 3], deviation: f64, size: (usize, usize), share: f64) -> Self {
         let surface = colour.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]);
         Self {
             surface,
             whitening: identity(1.0 / deviation),
             size,
-            share: 0.0,
+            share,
             spread: deviation,
         }
     }
@@ -254,11 +196,8 @@ impl BinderModel {
     fn from_guess(samples: &[Sample], guess: [f64; 3], size: (usize, usize)) -> Self {
         // Start wide around the guess; each round fits what the last round calls binder.
         let mut model = Self {
-            surface: guess.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            whitening: identity(1.0 / FIRST_DEVIATION),
-            size,
-            share: 0.0,
             spread: f64::INFINITY,
+            ..Self::flat(guess, FIRST_DEVIATION, size, 0.0)
         };
         for (round, terms) in [1, 1, 3, 3, TERMS, TERMS, TERMS, TERMS].into_iter().enumerate() {
             let gate = if round < 2 { 2.0 } else { GATE };
@@ -273,6 +212,19 @@ impl BinderModel {
     #[must_use]
     pub fn light(&self, x: usize, y: usize) -> [f32; 3] {
         self.at(self.place(x, y)).map(|c| c as f32)
+    }
+
+    /// [`light`](Self::light) along a row: what depends on the row alone is worked out once.
+    fn light_along(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
+        let [_, v] = self.place(0, y);
+        let row = self
+            .surface
+            .map(|c| [c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]].map(|c| c as f32));
+        let width = self.size.1 as f32;
+        move |x| {
+            let u = (2 * x + 1) as f32 / width - 1.0;
+            row.map(|c| c[0] + u * (c[1] + u * c[2]))
+        }
     }
 
     /// Pixels for their scatter: a wide cloud holds many pixels of anything.
@@ -290,8 +242,9 @@ impl BinderModel {
             .into_par_iter()
             .enumerate()
             .for_each(|(y, mut row)| {
+                let light = self.light_along(y);
                 for (x, p) in row.iter_mut().enumerate() {
-                    let light = self.light(x, y);
+                    let light = light(x);
                     (0..3).for_each(|c| p[c] -= light[c] - mean[c]);
                 }
             });
@@ -319,8 +272,9 @@ impl BinderModel {
             .into_par_iter()
             .enumerate()
             .for_each(|(y, mut row)| {
+                let light = self.light_along(y);
                 for (x, p) in row.iter_mut().enumerate() {
-                    let b = self.light(x, y);
+                    let b = light(x);
                     let d = [p[0] - b[0], p[1] - b[1], p[2] - b[2]];
                     *p = [
                         w[0][0] * d[0],
@@ -351,8 +305,7 @@ impl BinderModel {
     }
 
     fn at(&self, p: [f64; 2]) -> [f64; 3] {
-        let basis = basis(p);
-        self.surface.map(|c| c.iter().zip(basis).map(|(c, b)| c * b).sum())
+        colour_at(&self.surface, p)
     }
 
     fn squared(&self, place: [f64; 2], colour: [f64; 3]) -> f64 {
@@ -365,177 +318,7 @@ impl BinderModel {
     }
 }
 
-/// The photo's eight main colours by k-means, sRGB / 255, and the share of pixels nearest to each, most first: to choose the binder from. Fewer if there are fewer.
-///
-/// # Examples
-///
-/// ```
-/// use stereology_segment::{encoded_image, main_colours};
-///
-/// let photo = image::RgbImage::from_fn(40, 40, |x, _| image::Rgb([if x < 30 { 200 } else { 50 }; 3]));
-/// let colours = main_colours(&encoded_image(&photo), 0);
-/// assert_eq!((colours.len(), colours[0].1), (2, 0.75));
-/// ```
-#[must_use]
-pub fn main_colours(picture: &Array2<[f32; 3]>, seed: u64) -> Vec<([f32; 3], f64)> {
-    let colours: Vec<[f64; 3]> = sample(picture).iter().map(|s| s.colour).collect();
-    let groups = kmeans(&colours, GUESSES, seed);
-    let share = |g: usize| groups.assignment.iter().filter(|a| **a == g).count() as f64 / colours.len() as f64;
-    let main = groups.centres.iter().enumerate();
-    main.map(|(g, centre)| (centre.map(|c| c as f32), share(g))).collect()
-}
-
-/// Colour of the densest spot of a picture's colours: the middle of the fullest cube of eight levels' side.
-pub(crate) fn densest(picture: &Array2<[f32; 3]>) -> [f32; 3] {
-    let mut counts = vec![0_u32; 32 * 32 * 32];
-    let level = |v: f32| ((v * 32.0) as usize).min(31);
-    for s in sample(picture) {
-        let [r, g, b] = s.colour.map(|c| level(c as f32));
-        counts[(r * 32 + g) * 32 + b] += 1;
-    }
-    let fullest = (0..counts.len())
-        .max_by_key(|&i| (counts[i], std::cmp::Reverse(i)))
-        .unwrap_or(0);
-    [fullest / 1024, fullest / 32 % 32, fullest % 32].map(|l| (l as f32 + 0.5) / 32.0)
-}
-
-/// Mean distance of a mask's pixels to its outline: threads are shallow, particles deep.
-pub(crate) fn mean_depth(mask: &Array2<bool>) -> f64 {
-    let depths = distance_transform(mask);
-    let inside = depths.iter().filter(|d| **d > 0.0 && d.is_finite());
-    let (sum, count) = inside.fold((0.0, 0.0), |(sum, count), d| (sum + f64::from(*d), count + 1.0));
-    sum / f64::max(count, 1.0)
-}
-
 /// Euclidean length.
 pub(crate) fn length(v: [f32; 3]) -> f32 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
-}
-
-fn identity(scale: f64) -> [[f64; 3]; 3] {
-    [[scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, 0.0, scale]]
-}
-
-fn place(x: usize, y: usize, (height, width): (usize, usize)) -> [f64; 2] {
-    [
-        (2 * x + 1) as f64 / width as f64 - 1.0,
-        (2 * y + 1) as f64 / height as f64 - 1.0,
-    ]
-}
-
-fn basis([u, v]: [f64; 2]) -> [f64; TERMS] {
-    [1.0, u, v, u * u, u * v, v * v]
-}
-
-/// Pixels on a square lattice.
-fn sample(picture: &Array2<[f32; 3]>) -> Vec<Sample> {
-    let (height, width) = picture.dim();
-    let step = ((height * width / SAMPLE) as f64).sqrt().floor().max(1.0) as usize;
-    let at = |n: usize| (step / 2..n).step_by(step);
-    at(height)
-        .flat_map(|y| at(width).map(move |x| (x, y)))
-        .map(|(x, y)| Sample {
-            place: place(x, y, (height, width)),
-            colour: picture[[y, x]].map(f64::from),
-        })
-        .collect()
-}
-
-/// Least squares with a little shrinkage of slopes and curvatures, so that a binder seen in one corner is not extrapolated wildly.
-fn fit_surface(inside: &[&Sample], terms: usize) -> [[f64; TERMS]; 3] {
-    let mut normal = [[0.0; TERMS]; TERMS];
-    let mut right = [[0.0; TERMS]; 3];
-    for s in inside {
-        let b = basis(s.place);
-        for i in 0..terms {
-            for j in 0..=i {
-                normal[i][j] += b[i] * b[j];
-            }
-            for (right, colour) in right.iter_mut().zip(s.colour) {
-                right[i] += b[i] * colour;
-            }
-        }
-    }
-    let shrinkage = 1e-3 * inside.len() as f64;
-    (1..terms).for_each(|i| normal[i][i] += shrinkage);
-    // Cholesky: the matrix is positive definite (at least 50 samples, shrinkage).
-    for i in 0..terms {
-        for j in 0..=i {
-            let inner: f64 = (0..j).map(|k| normal[i][k] * normal[j][k]).sum();
-            let rest = normal[i][j] - inner;
-            normal[i][j] = if i == j {
-                rest.max(1e-12).sqrt()
-            } else {
-                rest / normal[j][j]
-            };
-        }
-    }
-    right.map(|mut r| {
-        for i in 0..terms {
-            let inner: f64 = (0..i).map(|k| normal[i][k] * r[k]).sum();
-            r[i] = (r[i] - inner) / normal[i][i];
-        }
-        for i in (0..terms).rev() {
-            let inner: f64 = (i + 1..terms).map(|k| normal[k][i] * r[k]).sum();
-            r[i] = (r[i] - inner) / normal[i][i];
-        }
-        r
-    })
-}
-
-/// Inverse Cholesky factor of the covariance around the surface, and its standard deviation. The covariance gives the shape, the median distance the scale, so that particles of a colour near the binder's do
-/// not widen it; it is kept above the quantisation.
-fn scatter(model: &BinderModel, inside: &[&Sample]) -> ([[f64; 3]; 3], f64) {
-    let mut cov = [[0.0; 3]; 3];
-    for s in inside {
-        let b = model.at(s.place);
-        let d = [s.colour[0] - b[0], s.colour[1] - b[1], s.colour[2] - b[2]];
-        for i in 0..3 {
-            for j in 0..=i {
-                cov[i][j] += d[i] * d[j];
-            }
-        }
-    }
-    cov.iter_mut().flatten().for_each(|v| *v /= inside.len() as f64);
-    let floor = LEAST_DEVIATION * LEAST_DEVIATION;
-    let w = inverse_factor(&cov, floor);
-    // Channels that scatter: 1 for a grey photo, 3 for a coloured one.
-    let dimension = (3.0 - w.iter().flatten().map(|v| v * v).sum::<f64>() * floor).clamp(1.0, 3.0);
-    let mut squares: Vec<f64> = inside
-        .iter()
-        .map(|s| {
-            let b = model.at(s.place);
-            let d = [s.colour[0] - b[0], s.colour[1] - b[1], s.colour[2] - b[2]];
-            w.iter()
-                .map(|w| (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]).powi(2))
-                .sum()
-        })
-        .collect();
-    let middle = squares.len() / 2;
-    let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-    // Median of chi squared of one and of three degrees of freedom, cut at the gate.
-    let expected = 0.4515 + (dimension - 1.0) * 0.914;
-    let scale = *median / expected;
-    cov.iter_mut().flatten().for_each(|v| *v *= scale);
-    (
-        inverse_factor(&cov, floor),
-        ((cov[0][0] + cov[1][1] + cov[2][2]) / 3.0 + floor).sqrt(),
-    )
-}
-
-/// Lower triangular W with WᵀW the inverse of a covariance, given by its lower triangle, plus `floor` on the diagonal.
-fn inverse_factor(cov: &[[f64; 3]; 3], floor: f64) -> [[f64; 3]; 3] {
-    let mut cov = *cov;
-    (0..3).for_each(|i| cov[i][i] += floor);
-    let l00 = cov[0][0].sqrt();
-    let (l10, l20) = (cov[1][0] / l00, cov[2][0] / l00);
-    let l11 = (cov[1][1] - l10 * l10).max(1e-12).sqrt();
-    let l21 = (cov[2][1] - l20 * l10) / l11;
-    let l22 = (cov[2][2] - l20 * l20 - l21 * l21).max(1e-12).sqrt();
-    // Inverse of a lower triangle.
-    let (w00, w11, w22) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
-    let w10 = -l10 * w00 * w11;
-    let w21 = -l21 * w11 * w22;
-    let w20 = -(l20 * w00 + l21 * w10) * w22;
-    [[w00, 0.0, 0.0], [w10, w11, 0.0], [w20, w21, w22]]
 }

@@ -67,9 +67,7 @@ impl Cores {
         let mut known = Vec::new();
         let mut means = RowMeans::new(deviation, &core);
         for y in 0..height {
-            let row = core.row(y);
-            let cores = (0..width).filter(|&x| row[x] > 0.0);
-            means.at_row(y, cores, |x, colour| {
+            means.at_row(y, |x, colour| {
                 source[[y, x]] = known.len() as u32;
                 known.push((colour, largest[pieces[[y, x]] as usize]));
             });
@@ -91,33 +89,39 @@ impl Cores {
         let (Some(mask), Some(source)) = (mask.as_slice(), self.source.as_slice_mut()) else {
             return;
         };
-        let around = |i: usize, x: usize| {
-            [
-                (i >= width).then(|| (i - width, x)),
-                (x > 0).then(|| (i - 1, x.wrapping_sub(1))),
-                (x + 1 < width).then_some((i + 1, x + 1)),
-                (i + width < height * width).then_some((i + width, x)),
-            ]
-        };
+        let pixels = height * width;
         let mut queue = VecDeque::new();
         // Only cores at the border of their region have anything to pass on.
         for y in 0..height {
             for x in 0..width {
                 let i = y * width + x;
-                if source[i] != NONE && around(i, x).into_iter().flatten().any(|(q, _)| source[q] == NONE) {
+                let bare = |inside: bool, q: usize| inside && source[q] == NONE;
+                if source[i] != NONE
+                    && (bare(i >= width, i.wrapping_sub(width))
+                        || bare(x > 0, i.wrapping_sub(1))
+                        || bare(x + 1 < width, i + 1)
+                        || bare(i + width < pixels, i + width))
+                {
                     queue.push_back((i as u32, x as u32, 0_u8));
                 }
             }
         }
         while let Some((i, x, outside)) = queue.pop_front() {
-            let from = source[i as usize];
-            for (q, column) in around(i as usize, x as usize).into_iter().flatten() {
-                let steps = if mask[q] { 0 } else { outside + 1 };
-                if source[q] == NONE && steps <= reach {
-                    source[q] = from;
-                    queue.push_back((q as u32, column as u32, steps));
+            let (i, x) = (i as usize, x as usize);
+            let from = source[i];
+            let mut pass_on = |inside: bool, q: usize, x: usize| {
+                if inside && source[q] == NONE {
+                    let steps = if mask[q] { 0 } else { outside + 1 };
+                    if steps <= reach {
+                        source[q] = from;
+                        queue.push_back((q as u32, x as u32, steps));
+                    }
                 }
-            }
+            };
+            pass_on(i >= width, i.wrapping_sub(width), x);
+            pass_on(x > 0, i.wrapping_sub(1), x.wrapping_sub(1));
+            pass_on(x + 1 < width, i + 1, x + 1);
+            pass_on(i + width < pixels, i + width, x);
         }
     }
 }
@@ -145,12 +149,19 @@ fn highest_around(field: &Array2<f32>, radius: usize) -> Array2<f32> {
     out
 }
 
+/// Channels, and the number of core pixels.
+const SUMMED: usize = 4;
+
 /// Means over the core pixels around, row by row: sums along five rows, then down them.
 struct RowMeans<'a> {
     deviation: &'a Array2<[f32; 3]>,
     core: &'a Array2<f32>,
-    /// Sums along rows: row y in slot y modulo their number; last the number of pixels.
-    sums: Vec<Vec<[f32; 4]>>,
+    /// Core pixels of one row, zeros elsewhere and at both ends.
+    row: Vec<f32>,
+    /// Sums along rows, row y in slot y modulo their number.
+    sums: Vec<Vec<f32>>,
+    /// Sums down the rows.
+    total: Vec<f32>,
     /// Rows summed so far.
     next: usize,
 }
@@ -161,41 +172,50 @@ impl<'a> RowMeans<'a> {
         Self {
             deviation,
             core,
-            sums: vec![vec![[0.0; 4]; width]; 2 * AROUND + 1],
+            row: vec![0.0; SUMMED * (width + 2 * AROUND)],
+            sums: vec![vec![0.0; SUMMED * width]; 2 * AROUND + 1],
+            total: vec![0.0; SUMMED * width],
             next: 0,
         }
     }
 
-    fn at_row(&mut self, y: usize, columns: impl Iterator<Item = usize>, mut put: impl FnMut(usize, [f32; 3])) {
+    /// Puts the mean at every core pixel of row `y`; rows are asked for in order.
+    fn at_row(&mut self, y: usize, mut put: impl FnMut(usize, [f32; 3])) {
         let height = self.core.dim().0;
         let last = (y + AROUND + 1).min(height);
         while self.next < last {
             self.sum_row(self.next);
             self.next += 1;
         }
+        let row = self.core.row(y);
+        if row.iter().all(|c| *c == 0.0) {
+            return;
+        }
         let slots = self.sums.len();
-        for x in columns {
-            let mut sum = [0.0_f32; 4];
-            for j in y.saturating_sub(AROUND)..last {
-                let row = &self.sums[j % slots][x];
-                (0..4).for_each(|c| sum[c] += row[c]);
+        self.total.fill(0.0);
+        for j in y.saturating_sub(AROUND)..last {
+            let pairs = self.total.iter_mut().zip(&self.sums[j % slots]);
+            pairs.for_each(|(t, s)| *t += s);
+        }
+        for ((x, core), sum) in row.iter().enumerate().zip(self.total.chunks_exact(SUMMED)) {
+            if *core > 0.0 {
+                put(x, [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]);
             }
-            put(x, [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]);
         }
     }
 
     fn sum_row(&mut self, y: usize) {
+        let inside = self.row.chunks_exact_mut(SUMMED).skip(AROUND);
+        for ((out, core), d) in inside.zip(self.core.row(y)).zip(self.deviation.row(y)) {
+            let values = if *core > 0.0 { [d[0], d[1], d[2], 1.0] } else { [0.0; 4] };
+            out.copy_from_slice(&values);
+        }
         let slots = self.sums.len();
-        let out = &mut self.sums[y % slots];
-        out.fill([0.0; 4]);
-        let width = out.len();
-        for ((x, core), d) in self.core.row(y).iter().enumerate().zip(self.deviation.row(y)) {
-            if *core > 0.0 {
-                for o in &mut out[x.saturating_sub(AROUND)..(x + AROUND + 1).min(width)] {
-                    (0..3).for_each(|c| o[c] += d[c]);
-                    o[3] += 1.0;
-                }
-            }
+        let sums = &mut self.sums[y % slots];
+        sums.fill(0.0);
+        for shift in 0..=2 * AROUND {
+            let pairs = sums.iter_mut().zip(&self.row[SUMMED * shift..]);
+            pairs.for_each(|(s, r)| *s += r);
         }
     }
 }

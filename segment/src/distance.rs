@@ -71,14 +71,21 @@ impl Envelope {
                     self.add(q as f64, f64::from(row[q]).powi(2));
                 }
             }
-            let mut k = 0;
-            for (p, d) in (start..).zip(&mut row[start..x]) {
-                let p = p as f64;
-                while self.vertices.get(k + 1).is_some_and(|next| next.2 < p) {
-                    k += 1;
+            if self.vertices.is_empty() {
+                row[start..x].fill(f32::INFINITY);
+            }
+            let mut p = start;
+            for (k, &(q, f, _)) in self.vertices.iter().enumerate() {
+                // A parabola holds up to the pixel where the next one takes over.
+                let end = self
+                    .vertices
+                    .get(k + 1)
+                    .map_or(x, |next| (next.2.floor() + 1.0).max(0.0) as usize);
+                let end = end.clamp(p, x);
+                for (p, d) in (p..).zip(&mut row[p..end]) {
+                    *d = ((p as f64 - q).powi(2) + f).sqrt() as f32;
                 }
-                let squared = self.vertices.get(k).map(|&(q, f, _)| (p - q).powi(2) + f);
-                *d = squared.map_or(f32::INFINITY, |s| s.sqrt() as f32);
+                p = end;
             }
         }
     }

@@ -6,7 +6,7 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use crate::{
-    binder::{BinderModel, TONE_DISTANCE, densest, length, main_colours, mean_depth},
+    binder::{BinderModel, length},
     category::{Category, SizeByCategory, categorise, size_by_category},
     error::SegmentError,
     faint::faint_regions,
@@ -20,6 +20,7 @@ use crate::{
     regions::{fill_holes, hysteresis, open},
     smoothing::smooth,
     split::{fill_label_holes, split_by_colour, split_by_shape},
+    tones::{TONE_DISTANCE, TwoTones, densest, main_colours, mean_depth},
 };
 
 /// What lies between the particles.
@@ -131,11 +132,14 @@ pub fn segment(
     let (mut find_faint, mut vague) = (true, false);
     if !clear && !given {
         let even = binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing));
-        let (tones, apart) = BinderModel::fit_two_tones(&even, options.seed);
-        let candidates = tones.deviation(&even);
-        if apart > TWO_TONES && edge_slope(&candidates.mapv(length)) > TONE_EDGE {
-            (deviation, distance) = (candidates.clone(), candidates.mapv(length));
-            (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, tones.share(), true);
+        let tones = TwoTones::find(&even, options.seed).filter(|t| t.apart() > TWO_TONES);
+        let two = tones.map(|t| t.binder(&even)).and_then(|binder| {
+            let candidates = binder.deviation(&even);
+            (edge_slope(&candidates.mapv(length)) > TONE_EDGE).then_some((candidates, binder.share()))
+        });
+        if let Some((candidates, covered)) = two {
+            (distance, deviation) = (candidates.mapv(length), candidates);
+            (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, covered, true);
             find_faint = false;
         } else {
             // No heap of colours stands apart: what lies near the densest spot may still be a binder.

@@ -20,6 +20,8 @@ pub(crate) struct Hills {
     of: Array2<u32>,
     /// Pixel at the top of each hill, and its height.
     tops: Vec<(u32, f32)>,
+    /// Pixels of each hill.
+    areas: Vec<usize>,
     /// Highest first: height, and the two hills.
     saddles: Vec<(f32, u32, u32)>,
 }
@@ -73,6 +75,8 @@ impl Hills {
             let hill = of[i];
             path.drain(..).for_each(|p| of[p] = hill);
         }
+        let mut areas = vec![0_usize; tops.len()];
+        of.iter().filter(|o| **o != NONE).for_each(|&o| areas[o as usize] += 1);
         let mut saddles = Vec::new();
         for y in 0..height {
             for x in 0..width {
@@ -106,6 +110,7 @@ impl Hills {
             width,
             of,
             tops,
+            areas,
             saddles: highest_first(&saddles),
         }
     }
@@ -139,6 +144,12 @@ impl Hills {
 
     /// Number of each chosen hill, from 1, on its pixels and on those of every other hill that is joined to it by higher saddles than to the rest; 0 where none is.
     fn grown(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Array2<u32> {
+        let named = self.named(numbers);
+        self.of.mapv(|hill| named.get(hill as usize).copied().unwrap_or(0))
+    }
+
+    /// That number, for each hill.
+    fn named(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
         let mut parent: Vec<u32> = (0..self.tops.len() as u32).collect();
         let mut label = vec![0_u32; self.tops.len()];
         numbers.into_iter().for_each(|(hill, n)| label[hill as usize] = n);
@@ -150,15 +161,24 @@ impl Hills {
                 label[a as usize] = first.max(second);
             }
         }
-        let named: Vec<u32> = (0..parent.len() as u32)
+        (0..parent.len() as u32)
             .map(|i| label[find(&mut parent, i) as usize])
-            .collect();
-        self.of.mapv(|hill| if hill == NONE { 0 } else { named[hill as usize] })
+            .collect()
     }
 
     /// The ground of the hills that stand out, numbered from 1 by decreasing height.
     pub(crate) fn divided(&self, h: impl Fn([usize; 2], f32) -> f32) -> Array2<u32> {
         self.grown(self.standing_out(h).into_iter().zip(1..))
+    }
+
+    /// How many hills that stand out have ground of at least `least` pixels.
+    pub(crate) fn count(&self, h: impl Fn([usize; 2], f32) -> f32, least: usize) -> usize {
+        let standing = self.standing_out(h);
+        let mut areas = vec![0_usize; standing.len() + 1];
+        for (number, area) in self.named(standing.into_iter().zip(1..)).iter().zip(&self.areas) {
+            areas[*number as usize] += area;
+        }
+        areas.iter().skip(1).filter(|a| **a >= least).count()
     }
 
     fn place(&self, pixel: u32) -> [usize; 2] {
@@ -240,4 +260,106 @@ pub fn watershed(field: &Array2<f32>, markers: &Array2<u32>, mask: &Array2<bool>
         tops.map(|(hill, top)| (hill, given[top.0 as usize]))
             .filter(|(_, n)| *n != 0),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regions::{neighbours4, neighbours8};
+    use proptest::prelude::*;
+    use std::collections::BinaryHeap;
+
+    /// Pixels from the highest down, joined one by one.
+    fn maxima(field: &Array2<f32>, h: f32) -> Array2<u32> {
+        let width = field.dim().1;
+        let at = |i: u32| [i as usize / width, i as usize % width];
+        let height = |i: u32| field[at(i)];
+        let mut order: Vec<u32> = (0..field.len() as u32).filter(|&i| height(i) > 0.0).collect();
+        order.sort_by(|&a, &b| height(b).total_cmp(&height(a)).then(a.cmp(&b)));
+        let mut parent = vec![NONE; field.len()];
+        let mut ended = vec![false; field.len()];
+        for &i in &order {
+            parent[i as usize] = i;
+            for q in neighbours8(at(i), field.dim()) {
+                let q = (q[0] * width + q[1]) as u32;
+                if parent[q as usize] == NONE {
+                    continue;
+                }
+                let (a, b) = (find(&mut parent, q), find(&mut parent, i));
+                let (high, low) = if (height(a), Reverse(a)) > (height(b), Reverse(b)) {
+                    (a, b)
+                } else {
+                    (b, a)
+                };
+                if high != low {
+                    ended[low as usize] |= height(low) - height(i) < h;
+                    parent[low as usize] = high;
+                }
+            }
+        }
+        let mut out = Array2::zeros(field.dim());
+        order.retain(|&i| !ended[i as usize]);
+        (1..).zip(order).for_each(|(n, i)| out[at(i)] = n);
+        out
+    }
+
+    /// Height of the lowest pixel on the highest way from each pixel to a marker, by a flood with a priority queue; what the watershed's labels must allow.
+    fn flooded(field: &Array2<f32>, markers: &Array2<u32>, mask: &Array2<bool>) -> Array2<u32> {
+        let mut labels = markers.clone();
+        let mut heap = BinaryHeap::new();
+        let key = |v: f32| v.max(0.0).to_bits();
+        let mut turn = 0_u32;
+        let mut push = |heap: &mut BinaryHeap<_>, q: [usize; 2], below: u32| {
+            heap.push((key(field[q]).min(below), Reverse(turn), q));
+            turn += 1;
+        };
+        for ((y, x), _) in markers.indexed_iter().filter(|(_, m)| **m != 0) {
+            push(&mut heap, [y, x], u32::MAX);
+        }
+        while let Some((level, _, p)) = heap.pop() {
+            for q in neighbours8(p, field.dim()) {
+                if mask[q] && labels[q] == 0 {
+                    labels[q] = labels[p];
+                    push(&mut heap, q, level);
+                }
+            }
+        }
+        labels
+    }
+
+    /// Smooth hills: distances to the outside of a few discs.
+    fn discs(places: &[(usize, usize, usize)]) -> Array2<f32> {
+        let mask = Array2::from_shape_fn((40, 50), |(y, x)| {
+            places
+                .iter()
+                .any(|&(j, i, r)| (y as f64 - j as f64).hypot(x as f64 - i as f64) < r as f64 + 4.0)
+        });
+        crate::smoothing::smooth_field(&crate::distance::distance_transform(&mask).mapv(|d| d.min(1e4)), 1.0)
+    }
+
+    proptest! {
+        /// Joining hills over saddles finds the maxima that joining all pixels finds.
+        #[test]
+        fn maxima_as_by_pixels(width in 1_usize..12, values in proptest::collection::vec(0_u8..40, 1..140), h in 1_u8..12) {
+            let height = values.len() / width;
+            // Multiples of the sorting's step.
+            let field = Array2::from_shape_fn((height, width), |(y, x)| f32::from(values[y * width + x]) / 64.0);
+            let h = f32::from(h) / 64.0;
+            prop_assert_eq!(h_maxima(&field, |_, _| h), maxima(&field, h));
+        }
+
+        /// The watershed covers what a flood covers, and they differ at borders only.
+        #[test]
+        fn watershed_as_by_flood(places in proptest::collection::vec((5_usize..35, 5_usize..45, 2_usize..8), 1..6)) {
+            let field = discs(&places);
+            let mask = field.mapv(|v| v > 0.2);
+            let markers = h_maxima(&field.clone(), |_, _| 0.7);
+            let (found, wanted) = (watershed(&field, &markers, &mask), flooded(&field, &markers, &mask));
+            for ((y, x), &label) in found.indexed_iter() {
+                prop_assert_eq!(label == 0, wanted[[y, x]] == 0);
+                let mut around = neighbours8([y, x], field.dim()).flat_map(|p| neighbours4(p, field.dim()));
+                prop_assert!(label == wanted[[y, x]] || around.any(|q| wanted[q] == label), "{y} {x}");
+            }
+        }
+    }
 }

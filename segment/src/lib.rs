@@ -106,5 +106,5 @@ pub use refine::half_contrast;
 pub use regions::{fill_holes, hysteresis, open};
 pub use segmentation::{Binder, Segmentation, segment};
 pub use smoothing::{smooth, smooth_field};
-pub use split::{split_by_colour, split_by_shape};
+pub use split::{contrast_depth, split_by_colour, split_by_depth, split_by_shape};
 pub use tones::{TwoTones, main_colours};

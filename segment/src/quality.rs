@@ -4,9 +4,13 @@ use ndarray::Array2;
 
 use crate::{
     finding::Finding,
+    hills::Hills,
     options::{EdgeRule, SegmentOptions},
-    pieces::{Contact, pieces},
-    segmentation::Segmentation,
+    pieces::connected_pieces,
+    refine::half_contrast,
+    regions::{fill_holes, hysteresis, open},
+    segmentation::{SHARP, Segmentation, drop_faint},
+    split::{rising, split_by_shape},
 };
 
 /// Fewest profiles that make a distribution of sizes.
@@ -15,7 +19,11 @@ const FEW: usize = 50;
 const EDGE: f64 = 20.0;
 /// Percent of the profiles near the least area that is worth a warning.
 const SMALL: f64 = 10.0;
-/// Change of the number of regions, percent of the profiles, that is worth a warning.
+/// Factors that show whether a number was a matter of luck.
+const MOVED: [f32; 3] = [0.8, 1.0, 1.2];
+/// Side of the part of the photo in which other thresholds are tried, pixels.
+const JUDGED: usize = 600;
+/// Change of the number of profiles, percent, that is worth a warning.
 const UNSTABLE: f64 = 10.0;
 /// Area fractions beyond which something is wrong, or unusual.
 const USUAL: std::ops::RangeInclusive<f64> = 0.01..=0.7;
@@ -56,12 +64,17 @@ impl Segmentation {
         }
     }
 
-    /// Regions at thresholds a fifth lower and higher.
-    pub(crate) fn judge_count(&mut self, distance: &Array2<f32>, [low, high]: [f32; 2], min_area: usize) {
-        let [fewer, here, more] = [1.2, 1.0, 0.8].map(|f| regions(distance, f * low, f * high, min_area));
-        let change = 100.0 * fewer.abs_diff(here).max(more.abs_diff(here)) as f64 / self.profiles.len().max(1) as f64;
-        if change > UNSTABLE {
-            self.findings.push(Finding::new("unstable-count", format!("moving the thresholds by a fifth changes the number of regions by {change:.0} % of the profiles: {here}, {more} with lower ones, {fewer} with higher; look at the overlay, or give the thresholds")));
+    /// What the number of profiles would be with other thresholds and another rise: each a fifth lower, as it is and a fifth higher.
+    pub(crate) fn judge_count(&mut self, thresholds: [usize; 3], rise: [usize; 3]) {
+        let change = |[lower, here, higher]: [usize; 3]| {
+            100.0 * lower.abs_diff(here).max(higher.abs_diff(here)) as f64 / here.max(1) as f64
+        };
+        for (name, counts) in [("thresholds", thresholds), ("rise", rise)] {
+            let ([lower, here, higher], change) = (counts, change(counts));
+            // A photo of a few particles: one more or less is no change worth a word.
+            if change > UNSTABLE && lower.abs_diff(here).max(higher.abs_diff(here)) > 2 {
+                self.findings.push(Finding::new("unstable-count", format!("with the {name} a fifth lower or higher the number of profiles in the middle of the photo changes by {change:.0} %: {lower}, {here}, {higher}; look at the overlay, or give the {name}")));
+            }
         }
     }
 
@@ -85,17 +98,39 @@ impl Segmentation {
     }
 }
 
-/// Connected regions (8 neighbours) of at least `low`, somewhere `high`, and of an area.
-fn regions(distance: &Array2<f32>, low: f32, high: f32, min_area: usize) -> usize {
-    let (pieces, count) = pieces(&distance.mapv(|z| z >= low), |z| z, Contact::Corners);
-    let mut areas = vec![(0_usize, false); count as usize + 1];
-    for (&piece, &z) in pieces.iter().zip(distance) {
-        let (area, strong) = &mut areas[piece as usize];
-        *area += 1;
-        *strong |= z >= high;
-    }
-    areas[1..]
-        .iter()
-        .filter(|(area, strong)| *strong && *area >= min_area)
-        .count()
+/// Numbers of profiles in the middle of the photo with thresholds a fifth lower, as they are and a fifth higher: the recipe without its repetitions.
+pub(crate) fn counts_by_threshold(
+    distance: &Array2<f32>,
+    deviation: &Array2<[f32; 3]>,
+    [low, high]: [f32; 2],
+    options: &SegmentOptions,
+) -> [usize; 3] {
+    let (distance, deviation) = (middle(distance), middle(deviation));
+    let blur = options.smoothing.hypot(SHARP);
+    MOVED.map(|f| {
+        let mut mask = hysteresis(&distance, f * low, f * high);
+        fill_holes(&mut mask, |hole, around| hole <= options.min_area.max(around / 20));
+        open(&mut mask);
+        mask = half_contrast(&deviation, &mask, blur);
+        open(&mut mask);
+        let (parts, _) = connected_pieces(&mask, |m| m);
+        let mut labels = split_by_shape(&parts, options.rise);
+        drop_faint(&mut labels, &distance, &deviation, f * high, options.min_area);
+        let mut areas = vec![0_usize; 1 + labels.iter().copied().max().unwrap_or(0) as usize];
+        labels.iter().for_each(|&l| areas[l as usize] += 1);
+        areas[1..].iter().filter(|a| **a >= options.min_area).count()
+    })
+}
+
+/// The middle of a picture, [`JUDGED`] pixels wide and high at most.
+fn middle<T: Copy>(picture: &Array2<T>) -> Array2<T> {
+    let (height, width) = picture.dim();
+    let (rows, columns) = (height.min(JUDGED), width.min(JUDGED));
+    let (top, left) = ((height - rows) / 2, (width - columns) / 2);
+    Array2::from_shape_fn((rows, columns), |(y, x)| picture[[top + y, left + x]])
+}
+
+/// Numbers of hills with a rise a fifth lower, as it is and a fifth higher.
+pub(crate) fn counts_by_rise(hills: &Hills, dim: (usize, usize), options: &SegmentOptions) -> [usize; 3] {
+    MOVED.map(|f| hills.count(rising(dim, options.rise.map(|r| f * r)), options.min_area))
 }

@@ -229,7 +229,6 @@ pub fn run(program: &Path, data: &Path, results: &Path, table: &Path) -> Result<
         }
     }
     text.push_str(&truths);
-    text.push_str(&segmentation(program, &images, results)?);
     text.push_str(&crate::sand::compare(data)?);
     text.push_str(&segmentation(program, &images, results)?);
     text.push_str(&times);

@@ -46,6 +46,33 @@ fn kinds_of_photo() {
     );
 }
 
+/// Palettes are looked up, and a camera's note on how it was held is followed: the same picture, stored lying, with orientation 6, stands.
+#[test]
+fn palettes_and_orientation() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("photo.png");
+    let mut encoder = png::Encoder::new(std::fs::File::create(&file).unwrap(), 2, 1);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_palette(vec![10, 20, 30, 200, 100, 50]);
+    encoder.write_header().unwrap().write_image_data(&[1, 0]).unwrap();
+    let read = read_photo(&file).unwrap();
+    assert_eq!(
+        [read.get_pixel(0, 0).0, read.get_pixel(1, 0).0],
+        [[200, 100, 50], [10, 20, 30]]
+    );
+    let file = folder.path().join("photo.jpg");
+    let lying = RgbImage::from_fn(64, 32, |x, _| image::Rgb([if x < 32 { 20 } else { 220 }; 3]));
+    lying.save(&file).unwrap();
+    let plain = std::fs::read(&file).unwrap();
+    // One entry of the first directory: tag 0x0112, a short, 6: turn by a quarter to the right.
+    let exif: &[u8] = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    std::fs::write(&file, [&plain[..2], exif, &plain[2..]].concat()).unwrap();
+    let standing = read_photo(&file).unwrap();
+    assert_eq!(standing.dimensions(), (32, 64));
+    assert!(standing.get_pixel(16, 10)[0] < 40 && standing.get_pixel(16, 54)[0] > 200);
+}
+
 /// Missing, empty, text and cut files are refused, each in its words.
 #[test]
 fn bad_photos() {

@@ -49,6 +49,29 @@ proptest! {
     }
 }
 
+/// The sizes of many discs are distributed as they were drawn, and their number and area are right: evenly from 10 to 32 pixels. The sizes found lie within 0.4 pixels of the drawn ones in order, so that the
+/// largest difference of the cumulative distributions is at most what shifting the law by as much makes of it, and one disc.
+#[test]
+fn histogram_of_discs() {
+    let size = [700, 520];
+    let drawn = discs(160, size, 8);
+    let found = run(&photo(&drawn, size, 8));
+    assert_eq!(found.profiles.len(), drawn.len());
+    let mut wanted: Vec<f64> = drawn.iter().map(|d| 2.0 * d.radius).collect();
+    let mut sizes: Vec<f64> = found.profiles.iter().map(|p| p.size).collect();
+    wanted.sort_by(f64::total_cmp);
+    sizes.sort_by(f64::total_cmp);
+    for (found, wanted) in sizes.iter().zip(&wanted) {
+        assert!((found - wanted).abs() < 0.4, "{found} {wanted}");
+    }
+    let below = |v: &[f64], x: f64| v.partition_point(|s| *s <= x) as f64 / v.len() as f64;
+    let apart = wanted.iter().map(|&x| (below(&sizes, x) - below(&wanted, x)).abs());
+    assert!(apart.fold(0.0, f64::max) < 0.04);
+    let area: f64 = drawn.iter().map(|d| std::f64::consts::PI * d.radius * d.radius).sum();
+    assert!((found.profiles.iter().map(|p| p.area).sum::<f64>() / area - 1.0).abs() < 0.01);
+    assert!(found.findings.is_empty(), "{:?}", found.findings);
+}
+
 /// Same photo, same bytes, on one thread and on three.
 #[test]
 fn threads_do_not_matter() {

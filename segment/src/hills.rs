@@ -33,7 +33,8 @@ impl Hills {
         let (field, parts) = (field.as_standard_layout(), parts.as_standard_layout());
         let heights = field.as_slice().unwrap_or_default();
         let parts = parts.as_slice().unwrap_or_default();
-        let above = |a: usize, b: usize| heights[a] > heights[b] || (heights[a] == heights[b] && a < b);
+        // A total order, so that walks up end: of equals the first is the highest.
+        let above = |a: usize, b: usize| heights[a] > heights[b] || (heights[a] >= heights[b] && a < b);
         let mut up = vec![NONE; heights.len()];
         for y in 0..height {
             let rows = y.saturating_sub(1)..(y + 2).min(height);

@@ -139,7 +139,7 @@ fn by_size(clusters: Clusters) -> Clusters {
 }
 
 /// Index of the centre nearest to a point; the first of equals.
-pub(crate) fn nearest_centre(point: &[f64; 3], centres: &[[f64; 3]]) -> usize {
+fn nearest_centre(point: &[f64; 3], centres: &[[f64; 3]]) -> usize {
     let mut best = (0, f64::INFINITY);
     for (g, centre) in centres.iter().enumerate() {
         let d = squared_distance(point, centre);

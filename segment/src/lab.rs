@@ -112,8 +112,9 @@ pub fn lab_image(encoded: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
     let (decode, lightness) = (Table::new(linear, 4096), Table::new(lightness, 16_384));
     let mut out = encoded.clone();
     out.axis_iter_mut(Axis(0)).into_par_iter().for_each(|mut row| {
-        row.iter_mut()
-            .for_each(|p| *p = lab_of_lightness(relative_xyz(p.map(|v| decode.at(v))).map(|t| lightness.at(t))))
+        for p in &mut row {
+            *p = lab_of_lightness(relative_xyz(p.map(|v| decode.at(v))).map(|t| lightness.at(t)));
+        }
     });
     out
 }

@@ -6,7 +6,7 @@ use crate::{
     cores::{CORE_DEPTH, Cores},
     distance::distance_transform,
     hills::Hills,
-    kmeans::{kmeans, nearest_centre},
+    kmeans::kmeans,
     pieces::{connected_pieces, find},
     regions::neighbours4,
     smoothing::smooth_field,
@@ -88,7 +88,17 @@ pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -
         .map(|(c, _)| c.map(f64::from))
         .collect();
     let centres = kmeans(&sample, GROUPS, seed).centres;
-    let group = |(c, _): &([f32; 3], f32)| 1 + nearest_centre(&c.map(f64::from), &centres) as u32;
+    let centres: Vec<[f32; 3]> = centres.into_iter().map(|c| c.map(|v| v as f32)).collect();
+    let group = |(c, _): &([f32; 3], f32)| {
+        let (mut best, mut least) = (0, f32::INFINITY);
+        for (number, centre) in (1..).zip(&centres) {
+            let d = (c[0] - centre[0]).powi(2) + (c[1] - centre[1]).powi(2) + (c[2] - centre[2]).powi(2);
+            if d < least {
+                (best, least) = (number, d);
+            }
+        }
+        best
+    };
     let of_core: Vec<u32> = cores.known.iter().map(group).collect();
     let groups = cores.source.mapv(|i| of_core.get(i as usize).copied().unwrap_or(0));
     let (mut parts, count) = connected_pieces(&groups, |g| g != 0);

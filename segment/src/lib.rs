@@ -16,7 +16,8 @@
 //!
 //! The steps were chosen on thirty others, where the scores are therefore in sample. [`faint_regions`] and spots given back to the particle they share half their outline with, together: AP50 +.003 on medium
 //! ones, +.013 on hard ones; lower thresholds for faint regions: +.003, 0; outlines by lightness as well as hue, with small flecks of compression dropped and strips at the photo's edge kept whole: 0, +.011.
-//! Tried and left out: a majority filter of outlines (no gain, and AP50 of a sand tomogram .765 to .691); two rounds of refinement instead of three (area error of hard ones .4 to .9 %).
+//! Tried and left out: a majority filter of outlines (no gain, and AP50 of a sand tomogram .765 to .691); two rounds of refinement instead of three (area error of hard ones .4 to .9 %); local contrast (AP50 of hard
+//! ones .986 to .969 and less). docs/segment.md has the table.
 //!
 //! # A photo of discs
 //!

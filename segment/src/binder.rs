@@ -167,7 +167,7 @@ impl BinderModel {
     }
 
     /// Fits surface and scatter to the samples within `gate` standard deviations, if there are enough.
-    fn fit_round(&mut self, samples: &[Sample], gate: f64, terms: usize) -> bool {
+    pub(crate) fn fit_round(&mut self, samples: &[Sample], gate: f64, terms: usize) -> bool {
         let inside: Vec<&Sample> = samples
             .iter()
             .filter(|s| self.squared(s.place, s.colour) < gate * gate)
@@ -300,7 +300,7 @@ impl BinderModel {
         self.deviation(picture).mapv(length)
     }
 
-    fn place(&self, x: usize, y: usize) -> [f64; 2] {
+    pub(crate) fn place(&self, x: usize, y: usize) -> [f64; 2] {
         place(x, y, self.size)
     }
 
@@ -308,7 +308,7 @@ impl BinderModel {
         colour_at(&self.surface, p)
     }
 
-    fn squared(&self, place: [f64; 2], colour: [f64; 3]) -> f64 {
+    pub(crate) fn squared(&self, place: [f64; 2], colour: [f64; 3]) -> f64 {
         let b = self.at(place);
         let d = [colour[0] - b[0], colour[1] - b[1], colour[2] - b[2]];
         self.whitening

@@ -133,12 +133,17 @@ pub fn segment(
     if !clear && !given {
         let even = binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing));
         let tones = TwoTones::find(&even, options.seed).filter(|t| t.apart() > TWO_TONES);
-        let two = tones.map(|t| t.binder(&even)).and_then(|binder| {
+        let two = tones.and_then(|tones| {
+            let binder = tones.binder(&even);
             let candidates = binder.deviation(&even);
-            (edge_slope(&candidates.mapv(length)) > TONE_EDGE).then_some((candidates, binder.share()))
+            let mut nearness = candidates.mapv(length);
+            (edge_slope(&nearness) > TONE_EDGE).then(|| {
+                tones.lower_beyond(&binder, &even, &mut nearness);
+                (nearness, candidates, binder.share())
+            })
         });
-        if let Some((candidates, covered)) = two {
-            (distance, deviation) = (candidates.mapv(length), candidates);
+        if let Some((nearness, candidates, covered)) = two {
+            (distance, deviation) = (nearness, candidates);
             (high, rounds, hole_share, share, clear) = (1.2 * low, 1, None, covered, true);
             (find_faint, one_tone) = (false, true);
         } else {

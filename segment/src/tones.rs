@@ -13,6 +13,8 @@ use crate::{
 pub(crate) const GUESSES: usize = 8;
 /// Distance z of two tones.
 pub(crate) const TONE_DISTANCE: f32 = 9.0;
+/// Distance z of one standard deviation of the binder where no other tone mixes with it: three, beyond which a pixel is none of its, make five.
+const BEYOND: f64 = 5.0 / 3.0;
 
 /// The two tones of a photo, such as a tomogram or a thin section, where neither is narrow enough for [`BinderModel::fit`], by k-means.
 ///
@@ -85,6 +87,62 @@ impl TwoTones {
             picture.dim(),
             self.shares[thin],
         )
+    }
+
+    /// Lowers the distances z to the [`binder`](Self::binder) of colours that lie beyond it, seen from the other tone, to five thirds of what they are in standard deviations of the binder's own colour on that
+    /// side, if that is less; colours nearer than a third of the tones' distance are left as they are. Towards the other tone, half of what separates them tells particles; away from it only the binder's scatter can: deeper pores are the tail of the binder's colours, dark grains are not.
+    ///
+    /// # Complexity
+    ///
+    /// Linear in pixels.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_segment::{BinderModel, TwoTones, encoded_image};
+    ///
+    /// // Pale squares of 20 pixels, 5 apart, on a binder of levels 40 to 100; one of them is a black grain.
+    /// let photo = image::RgbImage::from_fn(100, 100, |x, y| {
+    ///     let texture = ((x * 7919 ^ y * 104_729) % 61) as u8;
+    ///     let level = if x < 20 && y < 20 { 0 } else if x % 25 < 20 && y % 25 < 20 { 170 } else { 40 + texture };
+    ///     image::Rgb([level; 3])
+    /// });
+    /// let picture = encoded_image(&photo);
+    /// let tones = TwoTones::find(&picture, 0).expect("two colours");
+    /// let binder = tones.binder(&picture);
+    /// let plain = binder.distance(&picture);
+    /// let mut distance = plain.clone();
+    /// tones.lower_beyond(&binder, &picture, &mut distance);
+    /// assert!(distance[[10, 10]] > 5.0 && distance[[30, 30]] == plain[[30, 30]]);
+    /// ```
+    pub fn lower_beyond(&self, binder: &BinderModel, picture: &Array2<[f32; 3]>, distance: &mut Array2<f32>) {
+        let tone = binder.light(0, 0).map(f64::from);
+        let [a, b] = self.colours;
+        let nearer_a = squared_distance(&a, &tone) < squared_distance(&b, &tone);
+        let other = if nearer_a { b } else { a };
+        let is_beyond = |c: &[f64; 3]| (0..3).map(|i| (c[i] - tone[i]) * (other[i] - tone[i])).sum::<f64>() <= 0.0;
+        let mut samples = sample(picture);
+        samples.retain(|s| is_beyond(&s.colour));
+        // Together with their reflections the binder's tone is their middle.
+        for i in 0..samples.len() {
+            let Sample { place, colour } = samples[i];
+            let colour = std::array::from_fn(|c| 2.0 * tone[c] - colour[c]);
+            samples.push(Sample { place, colour });
+        }
+        let mut own = binder.clone();
+        // What lies further than halfway is in question and has no say.
+        own.fit_round(&samples, f64::from(TONE_DISTANCE) / 2.0, 1);
+        for (((y, x), z), colour) in distance.indexed_iter_mut().zip(picture) {
+            // Nearer than a third of the way nothing is in question.
+            if *z < TONE_DISTANCE / 3.0 {
+                continue;
+            }
+            let colour = colour.map(f64::from);
+            if is_beyond(&colour) {
+                let deviations = own.squared(own.place(x, y), colour).sqrt();
+                *z = z.min((BEYOND * deviations) as f32);
+            }
+        }
     }
 }
 

@@ -3,8 +3,11 @@
 use std::ops::ControlFlow;
 
 use image::{Rgb, RgbImage, imageops};
+use ndarray::Array2;
 use proptest::prelude::*;
-use stereology_segment::{EdgeRule, SegmentError, SegmentOptions, Segmentation, segment};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use stereology_segment::{EdgeRule, SegmentError, SegmentOptions, Segmentation, segment, smooth_field};
 
 use crate::drawn::{discs, photo};
 
@@ -247,4 +250,43 @@ fn edge_rules_are_unbiased() {
             assert!((mean - 1.0).abs() < 5.0 * error, "{rule:?} {kind}: {mean} ± {error}");
         }
     }
+}
+
+/// Two tones: pale grains close together in a mottled binder of medium grey. Between some of them the binder is darker, but no darker than its mottles reach: pores, not profiles. Black grains are profiles,
+/// though they lie on the pores' side of the binder.
+#[test]
+fn dark_pores_and_dark_grains() {
+    const CELL: usize = 28;
+    const SIDE: usize = 9 * CELL;
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let white = Array2::from_shape_fn((SIDE, SIDE), |_| rng.random::<f32>() - 0.5);
+    let mottle = smooth_field(&white, 2.0);
+    let scatter = (mottle.iter().map(|v| v * v).sum::<f32>() / mottle.len() as f32).sqrt();
+    let is_black = |x: usize, y: usize| (x / CELL + 9 * (y / CELL)) % 20 == 1;
+    // Where four cells meet.
+    let is_pore = |x: usize, y: usize| (x / CELL + 2 * (y / CELL)).is_multiple_of(5);
+    let photo = RgbImage::from_fn(SIDE as u32, SIDE as u32, |x, y| {
+        let (x, y) = (x as usize, y as usize);
+        let from = |a: usize, b: usize| (a as f32 + 0.5 - CELL as f32 / 2.0).hypot(b as f32 + 0.5 - CELL as f32 / 2.0);
+        let grain = (12.5 - from(x % CELL, y % CELL)).clamp(-0.75, 0.75) / 1.5 + 0.5;
+        let [px, py] = [x + CELL / 2, y + CELL / 2];
+        let pore = if is_pore(px, py) {
+            (6.0 - from(px % CELL, py % CELL)).clamp(-1.5, 1.5) / 3.0 + 0.5
+        } else {
+            0.0
+        };
+        let mut level = 115.0 + 28.0 * (mottle[[y, x]] / scatter).min(1.0);
+        level += pore * (35.0 - level);
+        level += grain * (if is_black(x, y) { 6.0 } else { 200.0 } - level);
+        Rgb([(level + 8.0 * white[[y, x]]).round().clamp(0.0, 255.0) as u8; 3])
+    });
+    let found = run(&photo);
+    for (y, x) in (0..9).flat_map(|j| (0..9).map(move |i| (j * CELL, i * CELL))) {
+        assert_eq!(found.labels[[y, x]], 0, "between the grains at {x}, {y}");
+        let label = found.labels[[y + CELL / 2, x + CELL / 2]];
+        assert_ne!(label, 0, "grain at {x}, {y}");
+        let size = found.profiles[label as usize - 1].size;
+        assert!((size - 25.0).abs() < 1.0, "size {size} at {x}, {y}");
+    }
+    assert_eq!(found.profiles.len(), 81);
 }

@@ -147,7 +147,7 @@ fn grains(bodies: &[UnitBody], types: &ParticleTypes, period: &PeriodicBox) -> R
 }
 
 /// Texture, uneven light, the lens's blur and the sensor's noise.
-fn photograph(section: &RgbImage, ids: &Array2<u32>) -> Result<RgbImage> {
+pub fn photograph(section: &RgbImage, ids: &Array2<u32>) -> Result<RgbImage> {
     let shape = [section.height() as usize, section.width() as usize];
     // Grain of the binder and of the stones, coarse and fine, each with its own strength by channel.
     let fields = [(3, 1.1), (4, 5.0), (5, 1.6), (6, 7.0)].map(|(task, scale)| noise(shape, scale, task));

@@ -4,6 +4,7 @@ mod bars;
 mod density_recovery;
 mod estimators;
 mod grain_size_tools;
+mod materials;
 mod packings;
 mod particles;
 mod section_likelihood;
@@ -19,7 +20,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 15] = [
+    let figures: [(&str, Figure); 16] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -32,6 +33,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("unfolding-coverage", estimators::draw_coverage),
         ("unfolding-speed", estimators::draw_speed),
         ("figure-09-particles", particles::draw_shapes),
+        ("figure-12-materials", materials::draw),
         ("packing", packings::draw),
         ("texture", textures::draw),
         ("readme", solids::draw_readme),

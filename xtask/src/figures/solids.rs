@@ -15,16 +15,21 @@ use stereology::sample;
 use stereology::shape::Body;
 use stereology::volume::SlicePlane;
 
-fn solid() -> Result<Synthesis> {
+/// The particles of the built-in sample.
+pub fn sample_types() -> Result<ParticleTypes> {
     let shapes = sample::truth()?.shapes;
     let bodies = shapes
         .iter()
         .map(|of| Ok((of.shape.clone(), Body::parse(&of.shape)?, of.share)))
         .collect::<Result<Vec<_>>>()?;
+    Ok(ParticleTypes::new(bodies)?)
+}
+
+fn solid() -> Result<Synthesis> {
     Ok(synthesize(
         &sample::photo()?,
         None,
-        &ParticleTypes::new(bodies)?,
+        &sample_types()?,
         &SynthesisOptions::default(),
         &|_, _| ControlFlow::Continue(()),
     )?)
@@ -78,7 +83,7 @@ pub fn draw_readme(folder: &Path) -> Result<()> {
 }
 
 /// Pictures of one size beside each other.
-fn row(parts: &[RgbImage]) -> RgbImage {
+pub fn row(parts: &[RgbImage]) -> RgbImage {
     let (width, height) = parts.first().map_or((0, 0), RgbImage::dimensions);
     let count = parts.len() as u32;
     let mut row = RgbImage::from_pixel(count * width + (count - 1) * GAP, height, image::Rgb([255; 3]));

@@ -1,0 +1,203 @@
+//! Figure 12: photographs of three materials, and what is carved from the solids made of them.
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use image::imageops::crop_imm;
+use nalgebra::{Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use stereology::anneal::{Grain, PackOptions, lognormal_sizes, pack, populate, scale_to_fraction};
+use stereology::pictures::picture_of_solid;
+use stereology::pipeline::{Extent, ParticleTypes, SynthesisOptions, synthesize};
+use stereology::render::{BlockOptions, Camera, RenderOptions};
+use stereology::sample;
+use stereology::shape::{PeriodicBox, TriangleMesh};
+use stereology::volume::{Axis, SlicePlane, Solid, turned};
+
+use super::solids::{row, sample_types};
+use crate::sample::photograph;
+
+/// Edge of each picture in pixels.
+const SIDE: u32 = 420;
+/// Photographs are so wide and high; the packing behind them is this deep.
+const PHOTO: u32 = 640;
+const DEPTH: f64 = 160.0;
+
+/// A material whose solid is known, to be photographed.
+struct Material {
+    shape: &'static str,
+    fraction: f64,
+    median_size: f64,
+    sigma: f64,
+    /// One is drawn for each particle.
+    colours: &'static [[f32; 3]],
+    binder: [f32; 3],
+    void: bool,
+}
+
+/// Crushed stone in bitumen.
+const ASPHALT: Material = Material {
+    shape: "rock:11",
+    fraction: 0.48,
+    median_size: 26.0,
+    sigma: 0.35,
+    colours: &[
+        [0.55, 0.54, 0.52],
+        [0.68, 0.66, 0.62],
+        [0.47, 0.45, 0.46],
+        [0.60, 0.55, 0.49],
+    ],
+    binder: [0.13, 0.13, 0.14],
+    void: false,
+};
+
+/// Bubbles, dark on the photograph for they are deep.
+const FOAM: Material = Material {
+    shape: "sphere",
+    fraction: 0.40,
+    median_size: 30.0,
+    sigma: 0.40,
+    colours: &[[0.36, 0.27, 0.14], [0.42, 0.32, 0.17]],
+    binder: [0.90, 0.80, 0.52],
+    void: true,
+};
+
+/// Each row: the photograph, a block of the solid, a vase carved from it.
+pub fn draw(folder: &Path) -> Result<()> {
+    for (name, photo, types, void) in [
+        ("terrazzo", sample::photo()?, sample_types()?, false),
+        (
+            "asphalt",
+            ASPHALT.photograph()?,
+            ParticleTypes::parse(&[ASPHALT.shape])?,
+            ASPHALT.void,
+        ),
+        (
+            "foam",
+            FOAM.photograph()?,
+            ParticleTypes::parse(&[FOAM.shape])?,
+            FOAM.void,
+        ),
+    ] {
+        let options = SynthesisOptions {
+            voids: if void { vec![0] } else { Vec::new() },
+            extent: Extent::Count(3000),
+            ..SynthesisOptions::default()
+        };
+        let made = synthesize(&photo, None, &types, &options, &|_, _| ControlFlow::Continue(()))?;
+        let part = crop_imm(&photo, 100, 100, SIDE, SIDE).to_image();
+        row(&[part, block(&made.solid)?, vase(&made.solid)?])
+            .save(folder.join(format!("figure-12-{name}.png")))
+            .context("figure 12 cannot be written")?;
+    }
+    Ok(())
+}
+
+impl Material {
+    /// A section of a packing of such particles, as a camera sees it.
+    fn photograph(&self) -> Result<RgbImage> {
+        let types = ParticleTypes::parse(&[self.shape])?;
+        let bodies = types.unit_bodies();
+        let side = f64::from(PHOTO);
+        let period = PeriodicBox::new(Vector3::new(side, side, DEPTH))?;
+        let mean_volume = bodies[0].volume() * self.median_size.powi(3) * (4.5 * self.sigma * self.sigma).exp();
+        let count = self.fraction * period.volume() / mean_volume;
+        let mut grains: Vec<Grain> = lognormal_sizes(count as usize, self.sigma, 12)?
+            .into_iter()
+            .map(|size| Grain {
+                shape: 0,
+                size,
+                category: 0,
+            })
+            .collect();
+        scale_to_fraction(&bodies, &mut grains, &period, self.fraction)?;
+        let start = populate(&grains, &period, 12);
+        let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
+            ControlFlow::Continue(())
+        })?;
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let colours = packing.particles().iter().map(|_| {
+            let light = 0.08 * (rng.random::<f32>() - 0.5);
+            self.colours[rng.random_range(0..self.colours.len())].map(|c| c + light)
+        });
+        let colours = colours.collect();
+        let solid = Solid::new(bodies, packing.particles().to_vec(), colours, period, self.binder, None)?;
+        let plane = SlicePlane::across(Axis::Z, 0.5 * DEPTH);
+        let ids = solid.slice_ids(&plane, PHOTO, PHOTO, 1.0)?;
+        photograph(&solid.slice(&plane, PHOTO, PHOTO, 1.0)?, &ids)
+    }
+}
+
+fn block(solid: &Solid) -> Result<RgbImage> {
+    let block = TriangleMesh::cuboid([300.0; 3]).mapped(|p| p + Vector3::repeat(150.0));
+    let BlockOptions { camera, picture } = BlockOptions::default();
+    let picture = picture.with_size(SIDE, SIDE);
+    let place = |p: &Point3<f64>| *p;
+    Ok(picture_of_solid(solid, &block, &place, &camera, &picture, &|_| {
+        ControlFlow::Continue(())
+    })?)
+}
+
+fn vase(solid: &Solid) -> Result<RgbImage> {
+    let camera = Camera {
+        up: Vector3::z_axis(),
+        elevation: 26.0,
+        ..Camera::default()
+    };
+    let options = RenderOptions::default().with_size(SIDE, SIDE).with_samples(4);
+    let mesh = turned_vase(520.0);
+    Ok(picture_of_solid(solid, &mesh, &turned, &camera, &options, &|_| {
+        ControlFlow::Continue(())
+    })?)
+}
+
+/// A vase of this height, open at the top: its outline, outer side up and inner side down, about the z axis.
+fn turned_vase(height: f64) -> TriangleMesh {
+    const AROUND: u32 = 160;
+    const ALONG: u32 = 120;
+    // Foot, belly, neck and lip.
+    let outside = |t: f64| 0.20 + 0.13 * (TAU * (0.75 * t + 0.02)).sin() + 0.05 * t * t * t + 0.02 * (1.0 - t);
+    let wall = 0.035;
+    let outline: Vec<[f64; 2]> = (0..=ALONG)
+        .map(|i| f64::from(i) / f64::from(ALONG))
+        .map(|t| [outside(t), t])
+        .chain((0..=ALONG).map(|i| 1.0 - f64::from(i) / f64::from(ALONG)).map(|t| {
+            let inner = (outside(t) - wall).max(0.01);
+            [inner, wall + (1.0 - wall) * t]
+        }))
+        .collect();
+    let rings = outline.len() as u32;
+    let mut mesh = TriangleMesh {
+        vertices: Vec::new(),
+        triangles: Vec::new(),
+    };
+    for [radius, z] in outline {
+        for k in 0..AROUND {
+            let angle = TAU * f64::from(k) / f64::from(AROUND);
+            let p = Point3::new(radius * angle.cos(), radius * angle.sin(), z);
+            mesh.vertices.push(p * height);
+        }
+    }
+    for ring in 0..rings - 1 {
+        for k in 0..AROUND {
+            let (a, b) = (ring * AROUND + k, ring * AROUND + (k + 1) % AROUND);
+            mesh.triangles.push([a, b, a + AROUND]);
+            mesh.triangles.push([b, b + AROUND, a + AROUND]);
+        }
+    }
+    // The bottom, below and inside.
+    for (ring, out) in [(0, true), (rings - 1, false)] {
+        let centre = mesh.vertices.len() as u32;
+        let z = mesh.vertices[(ring * AROUND) as usize].z;
+        mesh.vertices.push(Point3::new(0.0, 0.0, z));
+        for k in 0..AROUND {
+            let (a, b) = (ring * AROUND + k, ring * AROUND + (k + 1) % AROUND);
+            mesh.triangles.push(if out { [centre, b, a] } else { [centre, a, b] });
+        }
+    }
+    mesh
+}

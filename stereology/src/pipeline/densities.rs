@@ -30,7 +30,7 @@ pub struct MeasuredProfiles {
 /// How to unfold them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DensityOptions {
-    /// Size bins between 0 and the largest size; 0: as many as the profiles bear ([`automatic_bins`]).
+    /// Size bins between 0 and the largest size; 0: as many as the profiles bear ([`automatic_bins`](stereology_unfold::automatic_bins)).
     pub bins: usize,
     /// How they are spaced.
     pub spacing: Spacing,

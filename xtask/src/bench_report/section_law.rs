@@ -105,7 +105,7 @@ fn peer_of(row: &Value) -> Result<Peer> {
     })
 }
 
-/// Random sections that bring every K[i][j] = (j / n) p to the tolerance, p being the share of profiles; each section has m profiles.
+/// Random sections that bring every `K[i][j] = (j / n) p` to the tolerance, p being the share of profiles; each section has m profiles.
 fn sections_needed(law: &SectionLaw) -> f64 {
     let matrix = law.k_matrix(BINS);
     let mut needed = 0.0_f64;

@@ -27,8 +27,8 @@ pub const CODES: &[(&str, &str, &str)] = &[
     ),
     (
         "coarse-texture",
-        "A carved mesh has fewer triangles than the texture asks for: it looks blurred where its edges are long.",
-        "More --triangles, or a larger --period so that the texture is coarser on the mesh.",
+        "A carved mesh has fewer triangles, or an atlas fewer pixels, than the texture asks for: it looks blurred.",
+        "More --triangles, a larger --atlas, or a larger --period so that the texture is coarser on the mesh.",
     ),
     (
         "constant-exemplar",

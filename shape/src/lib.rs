@@ -47,6 +47,8 @@ mod control_sphere;
 mod convex;
 mod corner_normals;
 mod elliptic;
+#[cfg(feature = "io")]
+mod glb;
 mod hull;
 mod inside;
 mod largest_section;
@@ -62,7 +64,6 @@ mod periodic_box;
 #[cfg(feature = "io")]
 mod ply;
 #[cfg(feature = "io")]
-#[cfg(feature = "io")]
 mod point_file;
 mod polygon;
 mod primitives;
@@ -75,6 +76,9 @@ mod spherical_harmonics;
 mod stl;
 mod subdivision;
 mod superellipsoid;
+mod textured_mesh;
+#[cfg(feature = "io")]
+mod textured_mesh_file;
 mod topology;
 mod triangle_mesh;
 mod unit_body;
@@ -97,5 +101,8 @@ pub use point_file::{parse_points, read_points};
 pub use section::{SectionPolygon, section_polygons};
 pub use section_areas::{Knots, SectionAreas};
 pub use subdivision::Subdivision;
+pub use textured_mesh::{Texture, TexturedMesh};
+#[cfg(feature = "io")]
+pub use textured_mesh_file::write_textured_mesh;
 pub use triangle_mesh::TriangleMesh;
 pub use unit_body::UnitBody;

@@ -79,6 +79,12 @@ pub enum MeshFileError {
         /// The file.
         path: PathBuf,
     },
+    /// A textured mesh is written as GLB alone.
+    #[error("{}: meshes with a texture end in .glb", path.display())]
+    Ending {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file cannot be opened or read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {

@@ -1,6 +1,7 @@
 //! A mesh carved from the solid: the solid's colours on its surface, its triangles as fine as the texture asks.
 
 use crate::Solid;
+use crate::atlas::MOST_PIXELS;
 use nalgebra::{Point3, Vector3, center};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -64,9 +65,33 @@ pub enum CarveError {
         /// Difference of colours.
         contrast: f32,
     },
+    /// A side of an atlas that cannot be.
+    #[error("no atlas has a side of {pixels} pixels; ask for 1 to 16384")]
+    Pixels {
+        /// The side asked for.
+        pixels: u32,
+    },
+    /// The atlas is too small for so many triangles.
+    #[error("{triangles} triangles do not fit into an atlas of {pixels} x {pixels} pixels, {}", enough_or_not(*enough))]
+    Crowded {
+        /// Triangles of the mesh.
+        triangles: usize,
+        /// The side asked for.
+        pixels: u32,
+        /// The least side that would do: each chart 3 × 3 pixels.
+        enough: u64,
+    },
     /// The caller broke off.
     #[error("cancelled")]
     Cancelled,
+}
+
+fn enough_or_not(enough: u64) -> String {
+    if enough > u64::from(MOST_PIXELS) {
+        "nor into any; take colours of vertices, or fewer triangles".to_owned()
+    } else {
+        format!("at least {enough} are needed, several times as many for detail")
+    }
 }
 
 impl Solid {
@@ -155,7 +180,7 @@ impl Solid {
     }
 }
 
-fn check(mesh: &TriangleMesh) -> Result<(), CarveError> {
+pub(crate) fn check(mesh: &TriangleMesh) -> Result<(), CarveError> {
     let vertices = mesh.vertices.len();
     if mesh.triangles.is_empty() {
         return Err(CarveError::Empty);

@@ -56,8 +56,10 @@
 //! A voxel volume as the solid itself: it fixes the resolution, and its sections are made of steps. A tree of particles: the grid of cells is faster for packings, whose particles fill space evenly. Plain trilinear lookup of the
 //! residual: between the voxels of white noise it keeps an eighth of the variance, see [`Lookup`].
 
+mod atlas;
 mod carve;
 mod cells;
+mod charts;
 mod residual;
 mod sections;
 mod slice;
@@ -66,6 +68,7 @@ mod turned;
 mod voids;
 mod voxels;
 
+pub use atlas::{BakeOptions, Baked};
 pub use carve::{CarveError, CarveOptions, Carved};
 pub use residual::{Lookup, Residual};
 pub use sections::Axis;

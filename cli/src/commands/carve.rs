@@ -1,12 +1,12 @@
-//! `stereology carve`: a mesh with the solid's texture as colours of its vertices.
+//! `stereology carve`: a mesh with the solid's texture as colours of its vertices, or in a picture.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use nalgebra::Point3;
 use stereology::pipeline::Warning;
-use stereology::shape::{read_mesh, write_coloured_mesh};
-use stereology::volume::{CarveError, CarveOptions, turned};
+use stereology::shape::{TriangleMesh, read_mesh, write_coloured_mesh, write_textured_mesh};
+use stereology::volume::{BakeOptions, CarveError, CarveOptions, Solid, turned};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -23,8 +23,12 @@ use crate::values::{count, positive};
 /// DIR is an output folder of `stereology synthesize`. The mesh (.obj, .stl, .ply) is placed with its longest side on one period of the solid, or as --period
 /// says, and keeps its coordinates. Its triangles are bisected until colours between the ends of each edge are what a viewer interpolates, or edges are as
 /// short as a pixel of the photograph, or there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
+///
+/// With --atlas the mesh keeps its own triangles, and the texture is baked into a picture inside the .glb: for games and the web.
 #[derive(Args, Debug)]
-#[command(after_long_help = "Example: stereology carve out bunny.obj -o bunny.glb")]
+#[command(
+    after_long_help = "Example: stereology carve out bunny.obj -o bunny.glb\n         stereology carve out crate.obj --atlas 2048 -o crate.glb"
+)]
 pub struct Carve {
     /// Folder of a solid, written by `stereology synthesize`
     #[arg(value_name = "DIR")]
@@ -41,6 +45,9 @@ pub struct Carve {
     /// Triangles at most
     #[arg(long, value_name = "N", default_value_t = CarveOptions::default().most_triangles, value_parser = count)]
     pub triangles: usize,
+    /// Keep the triangles and bake the texture into a square picture with a side of so many pixels, up to 16384; .glb only
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384), conflicts_with = "triangles")]
+    pub atlas: Option<u32>,
     /// File: .glb or .ply
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -49,29 +56,43 @@ pub struct Carve {
 impl Carve {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let ending = self.output.extension().map(|ending| ending.to_ascii_lowercase());
-        if !ending.is_some_and(|ending| ending == "glb" || ending == "ply") {
+        let ends_in = |wanted: &str| ending.as_ref().is_some_and(|ending| ending == wanted);
+        if !(ends_in("glb") || ends_in("ply")) {
             return Err(Failure::usage("-o needs a file that ends in .glb or .ply"));
+        }
+        if self.atlas.is_some() && !ends_in("glb") {
+            return Err(Failure::usage("with --atlas, -o needs a file that ends in .glb"));
         }
         check_file(&self.output, everywhere.force)?;
         let solid = open_solid(&self.solid)?.solid;
         let mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         let placement = Placement::of(&mesh, &solid, self.period);
-        let options = CarveOptions {
-            most_triangles: self.triangles,
-            ..CarveOptions::default()
-        };
         let place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync) = if self.turned {
             &|p| turned(&placement.apply(p))
         } else {
             &|p| placement.apply(p)
         };
+        match self.atlas {
+            Some(pixels) => self.bake(&solid, &mesh, place, pixels, everywhere),
+            None => self.refine(&solid, &mesh, place, everywhere),
+        }
+    }
+
+    fn refine(
+        &self,
+        solid: &Solid,
+        mesh: &TriangleMesh,
+        place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
+        everywhere: &Everywhere,
+    ) -> Result<Answer, Failure> {
+        let options = CarveOptions {
+            most_triangles: self.triangles,
+            ..CarveOptions::default()
+        };
         let step = Step::begin("carving", everywhere.quiet);
         let carved = solid
-            .carve(&mesh, place, &options, &|done| step.at(done))
-            .map_err(|error| match error {
-                CarveError::Cancelled => Failure::stopped(),
-                error => Failure::run(format!("{}: {error}", self.mesh.display())),
-            })?;
+            .carve(mesh, place, &options, &|done| step.at(done))
+            .map_err(|error| self.failure(error))?;
         drop(step);
         write_coloured_mesh(&self.output, &carved.coloured).at(&self.output)?;
         let mesh = &carved.coloured.mesh;
@@ -96,4 +117,56 @@ impl Carve {
         }
         Ok(answer)
     }
+
+    fn bake(
+        &self,
+        solid: &Solid,
+        mesh: &TriangleMesh,
+        place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
+        pixels: u32,
+        everywhere: &Everywhere,
+    ) -> Result<Answer, Failure> {
+        let options = BakeOptions {
+            pixels,
+            ..BakeOptions::default()
+        };
+        let step = Step::begin("baking", everywhere.quiet);
+        let baked = solid
+            .bake(mesh, place, &options, &|done| step.at(done))
+            .map_err(|error| self.failure(error))?;
+        drop(step);
+        write_textured_mesh(&self.output, &baked.textured).at(&self.output)?;
+        let mut answer = Answer::new("carve");
+        answer
+            .field("vertices", mesh.vertices.len())
+            .field("triangles", mesh.triangles.len())
+            .field("charts", baked.charts)
+            .field("texel", baked.texel)
+            .field("atlas_used", baked.used)
+            .line(format!(
+                "{} triangles in {} charts of an atlas of {pixels} x {pixels} pixels written to {}",
+                counted(mesh.triangles.len() as u64),
+                counted(baked.charts as u64),
+                self.output.display()
+            ));
+        if let Some(coarseness) = baked.coarseness.filter(|coarseness| *coarseness > COARSE) {
+            answer.warn(Warning::new(
+                "coarse-texture",
+                format!(
+                    "a pixel of the atlas is as wide as {coarseness:.1} of the photograph's: give a larger --atlas or a larger --period"
+                ),
+            ));
+        }
+        Ok(answer)
+    }
+
+    fn failure(&self, error: CarveError) -> Failure {
+        match error {
+            CarveError::Cancelled => Failure::stopped(),
+            error => Failure::run(format!("{}: {error}", self.mesh.display())),
+        }
+    }
 }
+
+/// Pixels of the photograph along one of the atlas from which detail is missed.
+const COARSE: f64 = 2.0;

@@ -165,6 +165,13 @@ fn a_small_photograph_becomes_a_solid() {
         stereology(&["carve", &out, &mesh, "-o", &path(&folder, "mesh.obj")]).0,
         2
     );
+    let atlas = path(&folder, "atlas.glb");
+    let baked = answer(&["carve", &out, &mesh, "--atlas", "64", "-o", &atlas]);
+    assert!(baked["texel"].as_f64().unwrap() > 0.0 && fs::read(&atlas).unwrap().starts_with(b"glTF"));
+    let ply = path(&folder, "atlas.ply");
+    assert_eq!(stereology(&["carve", &out, &mesh, "--atlas", "64", "-o", &ply]).0, 2);
+    let (code, _, error) = stereology(&["carve", &out, &mesh, "--atlas", "2", "--force", "-o", &atlas]);
+    assert!(code == 1 && error.contains("at least"), "{error}");
 
     // volume.npy is what export gives.
     answer(&["export", &out, "--voxels", "24", "-o", &path(&folder, "volume.npy")]);

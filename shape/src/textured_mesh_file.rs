@@ -104,7 +104,6 @@ fn png_of(Texture { width, height, rgba }: &Texture, opaque: bool) -> io::Result
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a failing test panics")]
 mod tests {
     use super::write_textured_mesh;
     use crate::{MeshFileError, Texture, TexturedMesh, TriangleMesh, corner_normals};
@@ -156,17 +155,16 @@ mod tests {
         let primitive = &json["meshes"][0]["primitives"][0];
         let values = |accessor: &Value| {
             let accessor = &json["accessors"][usize::try_from(accessor.as_u64().unwrap()).unwrap()];
-            let words = view(&json, &data, &accessor["bufferView"]).as_chunks::<4>().0.to_vec();
-            words
+            view(&json, &data, &accessor["bufferView"]).as_chunks::<4>().0
         };
         let floats = |name: &str| -> Vec<f32> {
             let words = values(&primitive["attributes"][name]);
-            words.into_iter().map(f32::from_le_bytes).collect()
+            words.iter().copied().map(f32::from_le_bytes).collect()
         };
         let (positions, uvs) = (floats("POSITION"), floats("TEXCOORD_0"));
         let indices: Vec<usize> = values(&primitive["indices"])
-            .into_iter()
-            .map(|word| u32::from_le_bytes(word) as usize)
+            .iter()
+            .map(|word| u32::from_le_bytes(*word) as usize)
             .collect();
         assert_eq!(indices.len(), 36);
         let centre = json["nodes"][0]["translation"].as_array().unwrap();

@@ -47,7 +47,8 @@ fn bilinear(texture: &Texture, [u, v]: [f64; 2]) -> [f64; 4] {
     let mut colour = [0.0; 4];
     for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
         let weight = (1.0 - (x - x.floor() - dx).abs()) * (1.0 - (y - y.floor() - dy).abs());
-        let inside = |x: f64, side: u32| (x as i64).clamp(0, i64::from(side) - 1) as usize;
+        #[allow(clippy::cast_possible_truncation, reason = "clamped to the picture")]
+        let inside = |x: f64, side: u32| x.clamp(0.0, f64::from(side - 1)) as usize;
         let at =
             inside(y.floor() + dy, texture.height) * texture.width as usize + inside(x.floor() + dx, texture.width);
         (0..4).for_each(|c| colour[c] += weight * f64::from(texture.rgba[4 * at + c]) / 255.0);

@@ -10,7 +10,8 @@
 //! with p taken modulo the sides of the box and the residual modulo its own period, which divides them. The arithmetic is on sRGB-encoded values / 255 and nothing is clamped before a byte is written.
 //!
 //! Which particle is at a point is answered in some 100 ns by a grid of cells, each with the particle images that reach into it; a cell wholly inside a particle names it at once. Distances are true distances. Sections are exact
-//! ([`Solid::section_profiles`], for measuring) or pictures ([`Solid::slice`], for looking at); voxels go to files slab by slab ([`Solid::write_voxels`]).
+//! ([`Solid::section_profiles`], for measuring) or pictures ([`Solid::slice`], for looking at); voxels go to files slab by slab ([`Solid::write_voxels`]). Meshes get its colours at their vertices ([`Solid::carve`])
+//! or in a picture ([`Solid::bake`]).
 //!
 //! # What does a cut through a packing look like?
 //!

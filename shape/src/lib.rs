@@ -65,6 +65,7 @@ mod periodic_box;
 mod ply;
 #[cfg(feature = "io")]
 mod point_file;
+#[cfg(feature = "io")]
 mod polygon;
 mod primitives;
 mod rock;

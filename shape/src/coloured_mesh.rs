@@ -25,6 +25,7 @@ pub struct ColouredMesh {
 
 impl ColouredMesh {
     /// Whether all of it is seen.
+    #[cfg(feature = "io")]
     pub(crate) fn is_opaque(&self) -> bool {
         self.colours.iter().all(|colour| colour[3] >= 1.0)
     }

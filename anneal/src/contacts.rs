@@ -43,6 +43,27 @@ struct Block {
     worst: f64,
 }
 
+impl Block {
+    /// Adds the overlap of a pair, or of two parts of it that lie `arms` from the centres.
+    fn overlap(&mut self, [a, b]: [usize; 2], swelling: f64, gauge: &Gauge, arms: [Vector3<f64>; 2]) {
+        let depth = (swelling - gauge.value) * gauge.width;
+        self.energy += 0.5 * depth * depth;
+        self.worst = self.worst.max(1.0 - gauge.value);
+        let normal = if gauge.value > 0.0 {
+            gauge.normal
+        } else {
+            arbitrary(a, b)
+        };
+        self.pushes.push(Push {
+            a: a as u32,
+            b: b as u32,
+            force: normal * depth,
+            on_a: arms[0] + gauge.on_a * gauge.value.max(0.0),
+            on_b: arms[1] + gauge.on_b * gauge.value.max(0.0),
+        });
+    }
+}
+
 impl Overlaps {
     /// All pushes, always in the same order.
     pub(crate) fn pushes(&self) -> impl Iterator<Item = &Push> {
@@ -278,21 +299,7 @@ impl Assembly<'_> {
             return;
         }
         memory.safe_until = f64::NEG_INFINITY;
-        let depth = (swelling - gauge.value) * gauge.width;
-        block.energy += 0.5 * depth * depth;
-        block.worst = block.worst.max(1.0 - gauge.value);
-        let normal = if gauge.value > 0.0 {
-            gauge.normal
-        } else {
-            arbitrary(a, b)
-        };
-        block.pushes.push(Push {
-            a: a as u32,
-            b: b as u32,
-            force: normal * depth,
-            on_a: gauge.on_a * gauge.value.max(0.0),
-            on_b: gauge.on_b * gauge.value.max(0.0),
-        });
+        block.overlap([a, b], swelling, &gauge, [Vector3::zeros(); 2]);
     }
 
     #[expect(clippy::too_many_arguments, reason = "as above")]
@@ -318,21 +325,7 @@ impl Assembly<'_> {
                 return;
             }
             apart = false;
-            let depth = (swelling - gauge.value) * gauge.width;
-            block.energy += 0.5 * depth * depth;
-            block.worst = block.worst.max(1.0 - gauge.value);
-            let normal = if gauge.value > 0.0 {
-                gauge.normal
-            } else {
-                arbitrary(a, b)
-            };
-            block.pushes.push(Push {
-                a: a as u32,
-                b: b as u32,
-                force: normal * depth,
-                on_a: arm_a + gauge.on_a * gauge.value.max(0.0),
-                on_b: arm_b + gauge.on_b * gauge.value.max(0.0),
-            });
+            block.overlap([a, b], swelling, gauge, [*arm_a, *arm_b]);
         });
         memory.safe_until = if apart {
             travelled + safe.min(spheres)

@@ -45,8 +45,7 @@
 //!
 //! # What was rejected
 //!
-//! Rasterising with shadow maps (hollows stay flat); ambient occlusion with a constant for what is hidden (two thirds of the time, but hollows are grey whatever their colour); light baked into vertices (coarse meshes have none where it matters);
-//! boxes in double precision, two at a time (a third slower).
+//! Rasterising with shadow maps (hollows stay flat); ambient occlusion with a constant for what is hidden (hollows are grey whatever their colour); light baked into vertices (coarse meshes have none where it matters).
 
 mod block;
 mod camera;

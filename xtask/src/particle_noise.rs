@@ -1,16 +1,17 @@
 //! The noise of particles, from all of them pooled and from each alone: what it does to their borders.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use image::RgbImage;
 use ndarray::{Array2, Array3};
 use stereology::pyramid::{Exemplar, TextureError, TextureOptions, synthesize_image};
 use stereology::sample;
 use stereology::segment::{SegmentOptions, Segmentation, read_photo, segment};
+
+use crate::texture_table::replace_between;
 
 const MARKS: [&str; 2] = [
     "<!-- noise measured by cargo xtask acceptance -->\n",
@@ -27,13 +28,7 @@ pub fn run(data: &Path, page: &Path) -> Result<()> {
         compare(name, &read_photo(data.join(name))?, &mut text)?;
     }
     println!("{text}");
-    let old = fs::read_to_string(page).with_context(|| page.display().to_string())?;
-    let parts = old
-        .split_once(MARKS[0])
-        .and_then(|(before, rest)| Some((before, rest.split_once(MARKS[1])?.1)));
-    let (before, after) = parts.with_context(|| format!("{}: the marks are missing", page.display()))?;
-    fs::write(page, format!("{before}{}{text}{}{after}", MARKS[0], MARKS[1]))?;
-    Ok(())
+    replace_between(page, MARKS, &text)
 }
 
 fn compare(name: &str, photo: &RgbImage, text: &mut String) -> Result<()> {

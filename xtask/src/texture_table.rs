@@ -75,12 +75,17 @@ pub fn run(data: &Path, results: &Path, page: &Path) -> Result<()> {
             writeln!(text, "{line}")?;
         }
     }
+    replace_between(page, MARKS, &text)
+}
+
+/// Puts `text` between two marks of a page.
+pub fn replace_between(page: &Path, marks: [&str; 2], text: &str) -> Result<()> {
     let old = fs::read_to_string(page).with_context(|| page.display().to_string())?;
     let parts = old
-        .split_once(MARKS[0])
-        .and_then(|(before, rest)| Some((before, rest.split_once(MARKS[1])?.1)));
+        .split_once(marks[0])
+        .and_then(|(before, rest)| Some((before, rest.split_once(marks[1])?.1)));
     let (before, after) = parts.with_context(|| format!("{}: the marks are missing", page.display()))?;
-    fs::write(page, format!("{before}{}{text}{}{after}", MARKS[0], MARKS[1]))?;
+    fs::write(page, format!("{before}{}{text}{}{after}", marks[0], marks[1]))?;
     Ok(())
 }
 

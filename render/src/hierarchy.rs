@@ -122,7 +122,7 @@ impl Hierarchy {
         number as u32
     }
 
-    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1.
+    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1; a ray that is no number meets nothing.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "boxes have a margin for single precision"
@@ -135,6 +135,10 @@ impl Hierarchy {
         mut visit: impl FnMut(usize) -> Option<f64>,
     ) {
         let offset = (origin - self.middle) / self.reach;
+        // A ray that is no number would meet every box, those that are not there as well.
+        if !offset.iter().chain(direction.iter()).all(|x| x.is_finite()) {
+            return;
+        }
         // From far away single precision sees nothing: begin where the ray is nearest to the ball around all.
         let skipped = (-offset.dot(direction) - 1.5).max(0.0);
         let start = (offset + skipped * direction).map(|x| x as f32);

@@ -14,6 +14,8 @@ pub(crate) struct Hierarchy {
     /// Places are measured from here, in this length, so that all lie in −1..1.
     middle: Point3<f64>,
     reach: f64,
+    /// Boxes that may wait to be looked at while a ray is followed.
+    most_waiting: usize,
 }
 
 /// Four boxes and what is in each.
@@ -25,6 +27,8 @@ struct Node {
 
 /// The child is a triangle, not a node.
 const TRIANGLE: u32 = 1 << 31;
+/// So many waiting boxes need no memory of the heap: a tree of 20 floors.
+const FEW_WAITING: usize = 64;
 /// More than what a ray of length 4 loses to single precision.
 const MARGIN: f32 = 2e-6;
 
@@ -69,15 +73,18 @@ impl Hierarchy {
             nodes: Vec::with_capacity(corners.len() / 2 + 1),
             middle: nalgebra::center(&low, &high),
             reach: 0.5 * (high - low).norm(),
+            most_waiting: 0,
         };
         let tree = Bvh::build(&mut facets);
-        hierarchy.take(&tree.nodes, &facets, 0);
+        hierarchy.take(&tree.nodes, &facets, 0, 1);
         hierarchy
     }
 
-    /// Takes a node of the binary tree and its children's children; returns its number here.
+    /// Takes a node of the binary tree and its children's children, on this floor of ours; returns its number here.
     #[allow(clippy::cast_possible_truncation, reason = "meshes have fewer than 2^31 triangles")]
-    fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize) -> u32 {
+    fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize, floor: usize) -> u32 {
+        // A node is taken away and up to four are put there for it.
+        self.most_waiting = self.most_waiting.max(3 * floor + 1);
         let mut below = vec![(root, facets_bounds(tree, facets, root))];
         while below.len() < 4 {
             // The largest box that can be opened is opened.
@@ -109,7 +116,7 @@ impl Hierarchy {
         for (k, (index, bounds)) in below.into_iter().enumerate() {
             let child = match &tree[index] {
                 BvhNode::Leaf { shape_index, .. } => TRIANGLE | *shape_index as u32,
-                BvhNode::Node { .. } => self.take(tree, facets, index),
+                BvhNode::Node { .. } => self.take(tree, facets, index, floor + 1),
             };
             let [low, high] = [bounds.min, bounds.max].map(|p| ((p - self.middle) / self.reach).map(|x| x as f32));
             let node = &mut self.nodes[number];
@@ -145,9 +152,18 @@ impl Hierarchy {
         let inverse = direction.map(|x| (x as f32).recip());
         let limit = |far: f64| (far / self.reach - skipped) as f32 + 2.0 * MARGIN;
         let mut far = limit(far);
-        let mut stack = Vec::with_capacity(64);
-        stack.push((0_u32, 0.0_f32));
-        while let Some((child, near)) = stack.pop() {
+        let (mut few, mut many) = ([(0_u32, 0.0_f32); FEW_WAITING], Vec::new());
+        let stack = if self.most_waiting <= FEW_WAITING {
+            &mut few[..]
+        } else {
+            many.resize(self.most_waiting, (0, 0.0));
+            &mut many[..]
+        };
+        // The first to be looked at is the root.
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (child, near) = stack[waiting];
             if near > far {
                 continue;
             }
@@ -160,16 +176,17 @@ impl Hierarchy {
             }
             let node = &self.nodes[child as usize];
             let entries = node.entries(&start, &inverse, far);
-            let first = stack.len();
+            let first = waiting;
             for (k, &entry) in entries.iter().enumerate() {
                 if entry < f32::INFINITY {
                     // Farthest at the bottom: inserted in order.
-                    let mut place = stack.len();
-                    stack.push((node.child[k], entry));
+                    let mut place = waiting;
                     while place > first && stack[place - 1].1 < entry {
-                        stack.swap(place - 1, place);
+                        stack[place] = stack[place - 1];
                         place -= 1;
                     }
+                    stack[place] = (node.child[k], entry);
+                    waiting += 1;
                 }
             }
         }

@@ -20,8 +20,8 @@ pub(crate) struct Hierarchy {
 
 /// Four boxes and what is in each.
 struct Node {
-    low: [[f32; 4]; 3],
-    high: [[f32; 4]; 3],
+    /// By axis: the low and the high sides.
+    sides: [[[f32; 4]; 2]; 3],
     child: [u32; 4],
 }
 
@@ -109,8 +109,7 @@ impl Hierarchy {
         }
         let number = self.nodes.len();
         self.nodes.push(Node {
-            low: [[f32::INFINITY; 4]; 3],
-            high: [[f32::NEG_INFINITY; 4]; 3],
+            sides: [[[f32::INFINITY; 4], [f32::NEG_INFINITY; 4]]; 3],
             child: [0; 4],
         });
         for (k, (index, bounds)) in below.into_iter().enumerate() {
@@ -122,8 +121,8 @@ impl Hierarchy {
             let node = &mut self.nodes[number];
             node.child[k] = child;
             for axis in 0..3 {
-                node.low[axis][k] = low[axis] - MARGIN;
-                node.high[axis][k] = high[axis] + MARGIN;
+                node.sides[axis][0][k] = low[axis] - MARGIN;
+                node.sides[axis][1][k] = high[axis] + MARGIN;
             }
         }
         number as u32
@@ -199,26 +198,25 @@ impl Node {
         let (mut near, mut end) = ([0.0_f32; 4], [far; 4]);
         for axis in 0..3 {
             let (from, by) = (start[axis], inverse[axis]);
-            let (first, last) = if by >= 0.0 {
-                (&self.low[axis], &self.high[axis])
-            } else {
-                (&self.high[axis], &self.low[axis])
-            };
-            for k in 0..4 {
-                // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
-                let (enter, leave) = ((first[k] - from) * by, (last[k] - from) * by);
-                near[k] = if enter > near[k] { enter } else { near[k] };
-                end[k] = if leave < end[k] { leave } else { end[k] };
-            }
+            let back = usize::from(by < 0.0);
+            let (first, last) = (&self.sides[axis][back], &self.sides[axis][1 - back]);
+            let along = |sides: &[f32; 4]| sides.map(|side| (side - from) * by);
+            // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
+            near = larger(along(first), near);
+            end = smaller(along(last), end);
         }
-        let mut entries = [f32::INFINITY; 4];
-        for k in 0..4 {
-            if near[k] <= end[k] {
-                entries[k] = near[k];
-            }
-        }
-        entries
+        std::array::from_fn(|k| if near[k] <= end[k] { near[k] } else { f32::INFINITY })
     }
+}
+
+/// The larger of each pair, the second where either is no number: one instruction for all four.
+fn larger(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
+}
+
+/// The smaller of each pair, likewise.
+fn smaller(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
 }
 
 fn facets_bounds(tree: &[BvhNode<f64, 3>], facets: &[Facet], index: usize) -> Aabb<f64, 3> {

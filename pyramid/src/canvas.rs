@@ -96,6 +96,14 @@ fn turn(from: &[Vec<f32>], to: &mut [Vec<f32>], map: impl Fn(&[f32], &mut [f32])
     });
 }
 
+/// Gives the values of a band the target distribution. Returns ln(variance / target) before.
+pub(crate) fn match_band(values: &mut [f32], target: &Quantiles, matching: Matching) -> Option<f64> {
+    let mut pieces: Vec<&mut [f32]> = values.chunks_mut(PIECE).collect();
+    let (before, wanted) = (mean_square(&pieces), target.mean_square());
+    match_values(&mut pieces, target, matching);
+    (before > 0.0 && wanted > 0.0).then(|| (before / wanted).ln())
+}
+
 fn match_values(pieces: &mut [&mut [f32]], reference: &Quantiles, matching: Matching) {
     match matching {
         Matching::Table => match_by_table(pieces, reference),

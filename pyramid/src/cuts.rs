@@ -18,7 +18,15 @@ use crate::bank::most_levels;
 use crate::filters::{Directions, band_response};
 
 /// Steps of the tables of responses, up to the corner of the cube.
-const STEPS: usize = 1 << 14;
+const STEPS: usize = 1 << 12;
+/// Planes of frequencies are summed in this many blocks.
+const BLOCKS: usize = 16;
+/// Sweeps of [`Cuts::bring_variances`].
+const SWEEPS: usize = 4;
+/// Strength of its steps: a step of 1 falls short, since all cuts share the same waves.
+const STRENGTH: f64 = 1.5;
+/// Weight of the cuts along the axes in it; the others have 1.
+const WEIGHT_OF_AXES: f64 = 3.0;
 
 /// Mean squares of the pyramid bands of all cuts of a periodic volume (z, y, x) by planes of each normal (x, y, z): for every
 /// normal the high-pass, each level with its orientations added up, and the low-pass (the mean of the volume included).
@@ -99,14 +107,7 @@ pub fn cut_band(
     let mut cuts = Cuts::new(size, level + 1);
     let values: Vec<f32> = volume.iter().copied().collect();
     cuts.transform(&values);
-    // A frame of the plane.
-    let some = if normal.x.abs() < 0.9 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
-    let first = normal.cross(&some).normalize();
-    let second = normal.cross(&first);
+    let [first, second] = Frame::of(normal).along;
     let table = responses(level + 1, level + 1, f64::sqrt);
     let scale = 1.0 / values.len() as f64;
     let (half, quadrature) = (size[2] / 2 + 1, directions.quadrature());
@@ -146,6 +147,59 @@ fn checked(volume: ArrayView3<'_, f32>, levels: usize) -> Result<[usize; 3], Pyr
     Ok([nz, ny, nx])
 }
 
+/// The planes of a normal: two directions at right angles in them, (x, y, z).
+pub(crate) struct Frame {
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) along: [Vector3<f64>; 2],
+}
+
+impl Frame {
+    pub(crate) fn of(normal: &Unit<Vector3<f64>>) -> Self {
+        let some = if normal.x.abs() < 0.9 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let first = normal.cross(&some).normalize();
+        Self {
+            normal: normal.into_inner(),
+            along: [first, normal.cross(&first)],
+        }
+    }
+}
+
+fn normals(of: &[[f64; 3]]) -> Vec<Unit<Vector3<f64>>> {
+    of.iter().map(|v| Unit::new_normalize(Vector3::from(*v))).collect()
+}
+
+/// Normals along the diagonals of the cube's faces.
+pub(crate) fn face_diagonals() -> Vec<Unit<Vector3<f64>>> {
+    normals(&[
+        [1.0, 1.0, 0.0],
+        [1.0, 0.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [1.0, -1.0, 0.0],
+        [1.0, 0.0, -1.0],
+        [0.0, 1.0, -1.0],
+    ])
+}
+
+/// Axes, face diagonals and space diagonals, each with its weight; the weights add up to one.
+fn weighted_normals() -> (Vec<Unit<Vector3<f64>>>, Vec<f64>) {
+    let mut all = vec![Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+    all.extend(face_diagonals());
+    all.extend(normals(&[
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+        [1.0, -1.0, 1.0],
+        [1.0, 1.0, -1.0],
+    ]));
+    let weight = |i: usize| if i < 3 { WEIGHT_OF_AXES } else { 1.0 };
+    let sum: f64 = (0..all.len()).map(weight).sum();
+    let weights = (0..all.len()).map(|i| weight(i) / sum).collect();
+    (all, weights)
+}
+
 /// The transform of volumes of one size, and the squared responses of the bands.
 pub(crate) struct Cuts {
     fft: RealFft<f32>,
@@ -174,36 +228,104 @@ impl Cuts {
     /// For each normal: high-pass, levels, low-pass.
     pub(crate) fn variances(&mut self, field: &[f32], normals: &[Unit<Vector3<f64>>]) -> Vec<Vec<f64>> {
         self.transform(field);
-        let (size, half, tables) = (self.size, self.size[2] / 2 + 1, &self.tables);
-        // One sum a plane of frequencies, added in order: the same bits at any number of threads.
-        let planes: Vec<Vec<Vec<f64>>> = self
+        let power = self.power_by_radius(normals, None);
+        self.band_powers(&power, (field.len() as f64).powi(-2))
+    }
+
+    /// Changes the power of the field's waves as little as brings the band variances of the cuts along the axes, face
+    /// diagonals and space diagonals near those wanted (high-pass, levels, low-pass; zero where none is), axes first.
+    ///
+    /// ```text
+    /// P(k) ← P(k) Π_n Π_b (wanted_b / found_{n,b})^(s w_n G_b²(κ_n)),   Σ w_n = 1
+    /// ```
+    #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
+    pub(crate) fn bring_variances(&mut self, field: &mut [f32], wanted: &[f64]) {
+        let (normals, weights) = weighted_normals();
+        self.transform(field);
+        let per_sample = 1.0 / field.len() as f32;
+        self.spectrum.par_iter_mut().for_each(|v| *v *= per_sample);
+        let mut power = self.power_by_radius(&normals, None);
+        for _ in 0..SWEEPS {
+            let found = self.band_powers(&power, 1.0);
+            let tables: Vec<Vec<f64>> = found
+                .iter()
+                .zip(&weights)
+                .map(|(found, weight)| {
+                    let exponent = |(&found, &wanted): (&f64, &f64)| {
+                        let ratio = if found > 0.0 && wanted > 0.0 {
+                            wanted / found
+                        } else {
+                            1.0
+                        };
+                        0.5 * STRENGTH * weight * ratio.ln()
+                    };
+                    let exponents: Vec<f64> = found.iter().zip(wanted).map(exponent).collect();
+                    let at = |i: usize| exponents.iter().zip(&self.tables).map(|(e, table)| e * table[i]).sum();
+                    (0..STEPS + 2).map(at).collect()
+                })
+                .collect();
+            power = self.power_by_radius(&normals, Some(&tables));
+        }
+        self.fft.inverse_into(&mut self.spectrum, field, &mut self.work);
+    }
+
+    /// Power by the radius of the tangential frequency, for every normal, shared out between neighbouring steps; each wave is
+    /// first multiplied by the exponential of the sum of the normals' `factors` at its radii.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "radii are at most √3 < 2, factors are kept in f32"
+    )]
+    fn power_by_radius(&mut self, normals: &[Unit<Vector3<f64>>], factors: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
+        let (size, half) = (self.size, self.size[2] / 2 + 1);
+        let planes = size[0].div_ceil(BLOCKS);
+        // One sum a block, added in order: the same bits at any number of threads.
+        let blocks: Vec<Vec<Vec<f64>>> = self
             .spectrum
-            .par_chunks(half * size[1])
+            .par_chunks_mut(planes * half * size[1])
             .enumerate()
-            .map(|(z, bins)| {
-                let mut sums = vec![vec![0.0; tables.len()]; normals.len()];
-                for (i, bin) in bins.iter().enumerate() {
-                    let (row, x) = (z * size[1] + i / half, i % half);
+            .map(|(block, bins)| {
+                let mut sums = vec![vec![0.0; STEPS + 2]; normals.len()];
+                let mut positions = vec![(0_usize, 0.0); normals.len()];
+                for (i, bin) in bins.iter_mut().enumerate() {
+                    let (row, x) = (block * planes * size[1] + i / half, i % half);
                     let k = wave(size, row, x);
+                    for (position, normal) in positions.iter_mut().zip(normals) {
+                        let exact = 0.5 * radius(size, row, x, &k, normal) * STEPS as f64;
+                        *position = (exact as usize, exact - exact.floor());
+                    }
+                    if let Some(tables) = factors {
+                        let log: f64 = tables
+                            .iter()
+                            .zip(&positions)
+                            .map(|(table, &(i, part))| table[i] + part * (table[i + 1] - table[i]))
+                            .sum();
+                        *bin *= log.exp() as f32;
+                    }
                     let twice = if x == 0 || 2 * x == size[2] { 1.0 } else { 2.0 };
                     let power = twice * f64::from(bin.norm_sqr());
-                    for (sums, normal) in sums.iter_mut().zip(normals) {
-                        let radius = radius(size, row, x, &k, normal);
-                        sums.iter_mut()
-                            .zip(tables)
-                            .for_each(|(sum, table)| *sum += power * at(table, radius));
+                    for (sums, &(i, part)) in sums.iter_mut().zip(&positions) {
+                        sums[i] += (1.0 - part) * power;
+                        sums[i + 1] += part * power;
                     }
                 }
                 sums
             })
             .collect();
-        let scale = (field.len() as f64).powi(-2);
         (0..normals.len())
             .map(|n| {
-                (0..tables.len())
-                    .map(|band| scale * planes.iter().map(|plane| plane[n][band]).sum::<f64>())
+                (0..STEPS + 2)
+                    .map(|i| blocks.iter().map(|block| block[n][i]).sum())
                     .collect()
             })
+            .collect()
+    }
+
+    fn band_powers(&self, power: &[Vec<f64>], scale: f64) -> Vec<Vec<f64>> {
+        let dot = |power: &[f64], table: &[f64]| scale * power.iter().zip(table).map(|(p, t)| p * t).sum::<f64>();
+        power
+            .iter()
+            .map(|power| self.tables.iter().map(|table| dot(power, table)).collect())
             .collect()
     }
 }

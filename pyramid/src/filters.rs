@@ -108,6 +108,13 @@ impl Directions {
         self.power
     }
 
+    /// Amplitude of a wave along a filter's own direction, with the sign of `(−i)^p` but without its `i`.
+    #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
+    pub(crate) fn signed_gain(&self) -> f32 {
+        let sign = if matches!(self.power % 4, 1 | 2) { -1.0 } else { 1.0 };
+        (sign * self.gain) as f32
+    }
+
     /// Whether the filters are imaginary and odd rather than real and even.
     pub(crate) fn quadrature(&self) -> bool {
         (self.power % 2 == 1) != self.partner

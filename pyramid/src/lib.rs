@@ -74,6 +74,7 @@ mod fill;
 mod filters;
 mod isotropy;
 mod matching;
+mod oblique;
 mod options;
 mod plan;
 mod pyramid_error;

@@ -35,7 +35,7 @@ impl BandTargets {
         self
     }
 
-    /// Mean squares of the high-pass and of each level, its `orientations` added up.
+    /// Mean squares of the high-pass and of each level, its `orientations` added up; the variance of the low-pass.
     pub(crate) fn level_mean_squares(&self, orientations: usize) -> Vec<f64> {
         let of = |band: &Option<usize>| band.map_or(0.0, |target| self.targets[target].mean_square());
         let (high, rest) = self.of_band.split_at(1);
@@ -43,6 +43,7 @@ impl BandTargets {
         [of(&high[0])]
             .into_iter()
             .chain(levels.map(|bands| bands.iter().map(of).sum()))
+            .chain([self.low_variance()])
             .collect()
     }
 }

@@ -9,10 +9,11 @@ use stereology_spectrum::{RealFft, frequency};
 
 use crate::bank::FilterBank;
 use crate::canvas::{Canvas, band_mean_squares, match_bands};
-use crate::cuts::Cuts;
+use crate::cuts::{Cuts, face_diagonals};
 use crate::exemplar::{Exemplar, Prepared, View};
 use crate::filters::Directions;
 use crate::isotropy::Isotropy;
+use crate::oblique::Oblique;
 use crate::plan::{Plan, root_mean_square, shaped, white_noise};
 use crate::targets::{Analysis, BandTargets, Pooling};
 use crate::{Mode, TextureError, TextureOptions, TextureReport, VolumeSpectrum, volume_spectrum};
@@ -159,13 +160,14 @@ fn synthesize(
             impose_spectrum(&mut start[c], size, &volume_spectrum(&prepared.slice_spectrum(c)));
         }
     }
-    let passes = match options.mode {
+    let passes = |round| match options.mode {
+        Mode::Slices if options.is_oblique(round) => face_diagonals().len(),
         Mode::Slices | Mode::Oriented => 3,
         Mode::Spectrum | Mode::Volume => 1,
     };
     let steps = Steps {
         done: 0,
-        of: options.iterations * varying.len() * passes,
+        of: varying.len() * (0..options.iterations).map(passes).sum::<usize>(),
         progress,
     };
     let canvas = Canvas::new(start, &prepared, options.matching);
@@ -309,15 +311,27 @@ impl Convergence {
         for (i, &c) in varying.iter().enumerate() {
             let found = self.cuts.variances(&canvas.components[c], &normals);
             for (found, wanted) in found.iter().zip(&self.wanted) {
-                let bands = found.iter().zip(&wanted[i]).filter(|(f, w)| **f > 0.0 && **w > 0.0);
+                let levels = found.len() - 1;
+                let bands = found[..levels]
+                    .iter()
+                    .zip(&wanted[i])
+                    .filter(|(f, w)| **f > 0.0 && **w > 0.0);
                 errors.extend(bands.map(|(f, w)| ((f / w).ln().powi(2), 1)));
             }
         }
         root_mean_square(&errors)
     }
+
+    /// Brings the band variances of cuts of all directions near those wanted on the first axis.
+    fn bring(&mut self, canvas: &mut Canvas<'_>, varying: &[usize]) {
+        for (&c, wanted) in varying.iter().zip(&self.wanted[0]) {
+            self.cuts.bring_variances(&mut canvas.components[c], wanted);
+        }
+    }
 }
 
-/// Matches the 2D bands of all slices, one axis (z, y, x) after the other.
+/// Matches the 2D bands of all slices, one axis (z, y, x) or one face diagonal after the other; then, in [`Mode::Slices`], the
+/// band variances of cuts of all directions.
 #[allow(clippy::too_many_arguments, reason = "the parts of one synthesis")]
 fn match_slices<'a>(
     mut canvas: Canvas<'a>,
@@ -335,6 +349,9 @@ fn match_slices<'a>(
     let plane = Directions::plane(options.orientations);
     let banks = turns.map(|[_, rows, columns]| FilterBank::new(&[rows, columns], &[], plan.levels, &plane));
     let mut isotropy = (options.mode == Mode::Slices).then(|| Isotropy::new(size));
+    let mut oblique = (0..options.iterations)
+        .any(|round| options.is_oblique(round))
+        .then(|| Oblique::new(size, plan.levels, options.orientations));
     let mut convergence = Convergence::new(size, options, plan, targets);
     for round in 0..options.iterations {
         let mut errors = Vec::new();
@@ -344,20 +361,30 @@ fn match_slices<'a>(
                 .for_each(|&c| isotropy.restore(&mut canvas.components[c]));
         }
         canvas.match_channels();
-        for (axis, (bank, [slices, rows, columns])) in banks.iter().zip(turns).enumerate() {
-            for (&c, targets) in varying.iter().zip(targets[axis]) {
-                errors.push(match_bands(
-                    &mut canvas.components[c],
-                    bank,
-                    targets,
-                    options.matching,
-                    EVENNESS,
-                ));
-                steps.next()?;
+        if let Some(oblique) = oblique.as_mut().filter(|_| options.is_oblique(round)) {
+            for (&c, targets) in varying.iter().zip(targets[0]) {
+                for normal in face_diagonals() {
+                    let field = &mut canvas.components[c];
+                    errors.push(oblique.match_cuts(field, &normal, targets, options.matching));
+                    steps.next()?;
+                }
             }
-            for component in &mut canvas.components {
-                *component = first_axis_last(component, slices, rows * columns);
+        } else {
+            for (axis, (bank, [slices, rows, columns])) in banks.iter().zip(turns).enumerate() {
+                for (&c, targets) in varying.iter().zip(targets[axis]) {
+                    let field = &mut canvas.components[c];
+                    errors.push(match_bands(field, bank, targets, options.matching, EVENNESS));
+                    steps.next()?;
+                }
+                for component in &mut canvas.components {
+                    *component = first_axis_last(component, slices, rows * columns);
+                }
             }
+        }
+        if options.mode == Mode::Slices && options.oblique_rounds > 0 && round + 1 == options.iterations {
+            convergence.bring(&mut canvas, varying);
+            canvas.match_channels();
+            convergence.bring(&mut canvas, varying);
         }
         report.band_errors.push(root_mean_square(&errors));
         report.slice_errors.push(convergence.error(&canvas, varying));

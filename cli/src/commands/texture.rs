@@ -65,6 +65,9 @@ pub struct Choices {
     /// Orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
+    /// Rounds of `slices` that match oblique planes in place of the axes' slices; 0 is faster
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub oblique_rounds: usize,
     /// How values are given another distribution
     #[arg(long, value_enum, default_value_t = Matching::Table)]
     pub matching: Matching,
@@ -135,6 +138,7 @@ impl Choices {
             .with_mode(mode.way())
             .with_iterations(self.iterations)
             .with_orientations(self.orientations)
+            .with_oblique_rounds(self.oblique_rounds)
             .with_matching(match self.matching {
                 Matching::Table => pyramid::Matching::Table,
                 Matching::Exact => pyramid::Matching::Exact,
@@ -235,14 +239,16 @@ impl Texture {
                 report.levels
             ))
             .line(format!(
-                "bands off by, round by round: {}",
-                report
-                    .band_errors
-                    .iter()
-                    .map(|error| format!("{error:.3}"))
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            ))
+                "bands off by, before each round: {}",
+                listed(&report.band_errors)
+            ));
+        if !report.slice_errors.is_empty() {
+            answer.line(format!(
+                "slices off by, after each round: {}",
+                listed(&report.slice_errors)
+            ));
+        }
+        answer
             .field("shape", shape)
             .field("mode", mode.name())
             .field("iterations", self.choices.iterations)
@@ -279,6 +285,12 @@ impl Texture {
             _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),
         }
     }
+}
+
+/// Errors for people.
+fn listed(errors: &[f64]) -> String {
+    let words: Vec<String> = errors.iter().map(|error| format!("{error:.4}")).collect();
+    words.join(" ")
 }
 
 fn is_grey(picture: &RgbImage) -> bool {

@@ -99,7 +99,7 @@ impl TextureOptions {
     /// Whether a round matches oblique planes.
     pub(crate) fn is_oblique(&self, round: usize) -> bool {
         let to_come = self.iterations - 1 - round;
-        self.mode == Mode::Slices && round >= 2 && to_come % 2 == 0 && to_come / 2 < self.oblique_rounds
+        self.mode == Mode::Slices && round >= 2 && to_come.is_multiple_of(2) && to_come / 2 < self.oblique_rounds
     }
 
     /// With another [`Self::mode`].

@@ -59,6 +59,11 @@ impl Step {
         Self { bar }
     }
 
+    /// A line above the bar, for people who watch.
+    pub fn say(&self, line: &str) {
+        self.bar.println(line);
+    }
+
     /// Told how far the step is (0 to 1); breaks after Ctrl-C.
     pub fn at(&self, done: f64) -> ControlFlow<()> {
         self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);

@@ -4,14 +4,12 @@ use rayon::prelude::*;
 
 use crate::bank::FilterBank;
 use crate::exemplar::Prepared;
-use crate::matching::{match_by_table, match_exactly};
+use crate::matching::{Extent, Table, match_by_table, match_exactly};
 use crate::targets::BandTargets;
 use crate::{Matching, Quantiles};
 
 /// Samples whose colours are changed at a time.
 const BLOCK: usize = 1 << 14;
-/// Longest piece of a band that is matched on one thread.
-const PIECE: usize = 1 << 17;
 
 /// Components of the samples, planar.
 pub(crate) struct Canvas<'a> {
@@ -33,7 +31,7 @@ impl<'a> Canvas<'a> {
     pub(crate) fn match_channels(&mut self) {
         let mut channels = self.channels();
         for (channel, reference) in channels.iter_mut().zip(&self.exemplar.channels) {
-            match_values(&mut [channel], reference, self.matching);
+            match_values(channel, reference, self.matching);
         }
         let colours = &self.exemplar.colours;
         turn(&channels, &mut self.components, |colour, component| {
@@ -46,7 +44,7 @@ impl<'a> Canvas<'a> {
         let mut channels = self.channels();
         drop(self.components);
         for (channel, reference) in channels.iter_mut().zip(&self.exemplar.channels) {
-            match_values(&mut [channel], reference, self.matching);
+            match_values(channel, reference, self.matching);
         }
         let count = channels.len();
         let mut values = vec![0.0; count * channels[0].len()];
@@ -98,104 +96,153 @@ fn turn(from: &[Vec<f32>], to: &mut [Vec<f32>], map: impl Fn(&[f32], &mut [f32])
 
 /// Gives the values of a band the target distribution. Returns ln(variance / target) before.
 pub(crate) fn match_band(values: &mut [f32], target: &Quantiles, matching: Matching) -> Option<f64> {
-    let mut pieces: Vec<&mut [f32]> = values.chunks_mut(PIECE).collect();
-    let (before, wanted) = (mean_square(&pieces), target.mean_square());
-    match_values(&mut pieces, target, matching);
+    let extent = Extent::of(values);
+    match matching {
+        Matching::Table => Table::new(&[(values, 1.0)], extent, target).apply(values, 1.0),
+        Matching::Exact => match_exactly(&mut [values], target),
+    }
+    log_ratio(extent, values.len(), target)
+}
+
+/// ln(variance / target), where both are positive.
+fn log_ratio(extent: Extent, n: usize, target: &Quantiles) -> Option<f64> {
+    let (before, wanted) = (extent.power / n as f64, target.mean_square());
     (before > 0.0 && wanted > 0.0).then(|| (before / wanted).ln())
 }
 
-fn match_values(pieces: &mut [&mut [f32]], reference: &Quantiles, matching: Matching) {
+fn match_values(values: &mut [f32], reference: &Quantiles, matching: Matching) {
     match matching {
-        Matching::Table => match_by_table(pieces, reference),
-        Matching::Exact => match_exactly(pieces, reference),
+        Matching::Table => match_by_table(values, reference),
+        Matching::Exact => match_exactly(&mut [values], reference),
     }
 }
 
 /// Gives the bands of a field's members (the slices of a volume, or the one image or volume) the target distributions,
-/// each band over all members at once. Returns `Σ ln²(variance / target)` over the bands, and their number.
+/// each band over all members at once, after the members' powers have been brought nearer to each other ([`evening_factors`]).
+/// `coefficients` is kept for the next call. Returns `Σ ln²(variance / target)` over the bands, and their number.
 pub(crate) fn match_bands(
     field: &mut [f32],
     bank: &FilterBank<f32>,
     targets: &BandTargets,
     matching: Matching,
-    evenness: f32,
+    evenness: f64,
+    coefficients: &mut Vec<f32>,
 ) -> (f64, usize) {
     let samples: usize = bank.shape().iter().product();
-    let total = bank.coefficients();
-    let members = field.len() / samples;
-    let mut coefficients = vec![0.0; members * total];
-    coefficients
+    let (total, ranges) = (bank.coefficients(), bank.ranges());
+    coefficients.resize(field.len() / samples * total, 0.0);
+    let extents: Vec<Vec<Extent>> = coefficients
         .par_chunks_mut(total)
         .zip(field.par_chunks(samples))
-        .for_each_init(
+        .map_init(
             || bank.work(),
-            |work, (coefficients, field)| bank.analyse(field, coefficients, work),
-        );
-    if evenness > 0.0 {
-        even_out(&mut coefficients, bank, evenness);
-    }
-    let mut bands: Vec<Vec<&mut [f32]>> = bank.ranges().iter().map(|_| Vec::new()).collect();
-    for member in coefficients.chunks_exact_mut(total) {
-        let mut rest = member;
-        for (band, range) in bands.iter_mut().zip(bank.ranges()) {
-            let (here, behind) = rest.split_at_mut(range.len());
-            band.extend(here.chunks_mut(PIECE));
-            rest = behind;
-        }
-    }
-    let errors: Vec<Option<f64>> = bands
-        .par_iter_mut()
-        .zip(&targets.of_band)
-        .map(|(pieces, &target)| {
-            let target = &targets.targets[target?];
-            let (before, wanted) = (mean_square(pieces), target.mean_square());
-            match_values(pieces, target, matching);
-            (before > 0.0 && wanted > 0.0).then(|| (before / wanted).ln())
-        })
+            |work, (coefficients, field)| {
+                bank.analyse(field, coefficients, work);
+                ranges
+                    .iter()
+                    .map(|range| Extent::of(&coefficients[range.clone()]))
+                    .collect()
+            },
+        )
         .collect();
-    drop(bands);
+    let factors = evening_factors(&extents, bank, evenness);
+    let matched: Vec<(Option<Table>, Option<f64>)> = match matching {
+        Matching::Table => (0..ranges.len())
+            .into_par_iter()
+            .map(|band| {
+                let Some(target) = targets.of_band[band] else {
+                    return (None, None);
+                };
+                let target = &targets.targets[target];
+                let of_members = extents.iter().zip(&factors).map(|(e, f)| e[band].scaled(f[band]));
+                let extent = of_members.reduce(Extent::with).expect("at least one member");
+                let members = coefficients.chunks_exact(total).zip(&factors);
+                let pieces: Vec<(&[f32], f32)> = members
+                    .map(|(member, factors)| (&member[ranges[band].clone()], factors[band]))
+                    .collect();
+                let n = pieces.len() * ranges[band].len();
+                (Some(Table::new(&pieces, extent, target)), log_ratio(extent, n, target))
+            })
+            .collect(),
+        Matching::Exact => match_bands_exactly(coefficients, bank, targets, &factors),
+    };
     field
         .par_chunks_mut(samples)
-        .zip(coefficients.par_chunks(total))
+        .zip(coefficients.par_chunks_mut(total))
+        .zip(&factors)
         .for_each_init(
             || bank.work(),
-            |work, (field, coefficients)| bank.synthesise(coefficients, field, work),
+            |work, ((field, coefficients), factors)| {
+                for (((table, _), range), &factor) in matched.iter().zip(ranges).zip(factors) {
+                    if let Some(table) = table {
+                        table.apply(&mut coefficients[range.clone()], factor);
+                    }
+                }
+                bank.synthesise(coefficients, field, work);
+            },
         );
-    let errors: Vec<f64> = errors.into_iter().flatten().collect();
+    let errors: Vec<f64> = matched.into_iter().filter_map(|(_, error)| error).collect();
     (errors.iter().map(|e| e * e).sum(), errors.len())
 }
 
-/// Brings the power of every member in every level (orientations together) nearer to the mean over the members.
-fn even_out(coefficients: &mut [f32], bank: &FilterBank<f32>, evenness: f32) {
-    let (total, ranges, count) = (bank.coefficients(), bank.ranges(), bank.orientations());
-    let levels: Vec<std::ops::Range<usize>> = [ranges[0].clone()]
-        .into_iter()
-        .chain((0..bank.level_count()).map(|l| ranges[1 + l * count].start..ranges[(l + 1) * count].end))
-        .collect();
-    let powers: Vec<Vec<f64>> = coefficients
-        .par_chunks(total)
-        .map(|member| {
-            levels
-                .iter()
-                .map(|level| member[level.clone()].iter().map(|&v| f64::from(v).powi(2)).sum())
-                .collect()
-        })
-        .collect();
-    let means: Vec<f64> = (0..levels.len())
-        .map(|l| powers.iter().map(|power| power[l]).sum::<f64>() / powers.len() as f64)
-        .collect();
-    coefficients
-        .par_chunks_mut(total)
-        .zip(&powers)
-        .for_each(|(member, powers)| {
-            for ((level, power), mean) in levels.iter().zip(powers).zip(&means) {
-                if *power > 0.0 {
-                    #[allow(clippy::cast_possible_truncation, reason = "a factor near one")]
-                    let factor = (mean / power).powf(f64::from(evenness) / 2.0) as f32;
-                    member[level.clone()].iter_mut().for_each(|v| *v *= factor);
-                }
+/// The bands of all members times their factors, then matched by rank.
+fn match_bands_exactly(
+    coefficients: &mut [f32],
+    bank: &FilterBank<f32>,
+    targets: &BandTargets,
+    factors: &[Vec<f32>],
+) -> Vec<(Option<Table>, Option<f64>)> {
+    let mut bands: Vec<Vec<&mut [f32]>> = bank.ranges().iter().map(|_| Vec::new()).collect();
+    for member in coefficients.chunks_exact_mut(bank.coefficients()) {
+        let mut rest = member;
+        for (band, range) in bands.iter_mut().zip(bank.ranges()) {
+            let (here, behind) = rest.split_at_mut(range.len());
+            band.push(here);
+            rest = behind;
+        }
+    }
+    bands
+        .par_iter_mut()
+        .enumerate()
+        .map(|(band, pieces)| {
+            let Some(target) = targets.of_band[band] else {
+                return (None, None);
+            };
+            let target = &targets.targets[target];
+            for (piece, factors) in pieces.iter_mut().zip(factors) {
+                piece.iter_mut().for_each(|v| *v *= factors[band]);
             }
-        });
+            let extent = pieces.iter().map(|piece| Extent::of(piece)).reduce(Extent::with);
+            match_exactly(pieces, target);
+            let n = pieces.iter().map(|piece| piece.len()).sum();
+            (None, extent.and_then(|extent| log_ratio(extent, n, target)))
+        })
+        .collect()
+}
+
+/// Factors, by member and band, that bring the power of every member in every level (orientations together) nearer to the mean
+/// over the members: by `evenness` of the way, in logarithms.
+fn evening_factors(extents: &[Vec<Extent>], bank: &FilterBank<f32>, evenness: f64) -> Vec<Vec<f32>> {
+    let (bands, count) = (bank.ranges().len(), bank.orientations());
+    let mut factors = vec![vec![1.0; bands]; extents.len()];
+    if evenness == 0.0 {
+        return factors;
+    }
+    let levels = [0..1]
+        .into_iter()
+        .chain((0..bank.level_count()).map(|l| 1 + l * count..1 + (l + 1) * count));
+    for level in levels {
+        let power = |extents: &Vec<Extent>| extents[level.clone()].iter().map(|e| e.power).sum::<f64>();
+        let mean = extents.iter().map(power).sum::<f64>() / extents.len() as f64;
+        for (factors, extents) in factors.iter_mut().zip(extents) {
+            let power = power(extents);
+            if power > 0.0 {
+                #[allow(clippy::cast_possible_truncation, reason = "a factor near one")]
+                factors[level.clone()].fill((mean / power).powf(evenness / 2.0) as f32);
+            }
+        }
+    }
+    factors
 }
 
 /// Mean squares of the bands of one field.
@@ -204,27 +251,6 @@ pub(crate) fn band_mean_squares(field: &[f32], bank: &FilterBank<f32>) -> Vec<f6
     bank.analyse(field, &mut coefficients, &mut bank.work());
     bank.ranges()
         .iter()
-        .map(|range| mean_square(&coefficients[range.clone()].chunks(PIECE).collect::<Vec<_>>()))
+        .map(|range| Extent::of(&coefficients[range.clone()]).power / range.len() as f64)
         .collect()
-}
-
-/// Mean square over pieces: one sum a piece, added in order.
-fn mean_square<P: AsRef<[f32]> + Sync>(pieces: &[P]) -> f64 {
-    let sums: Vec<f64> = pieces
-        .par_iter()
-        .map(|piece| {
-            let values = piece.as_ref().chunks_exact(4);
-            let rest: f64 = values.remainder().iter().map(|&v| f64::from(v).powi(2)).sum();
-            let mut lanes = [0.0_f64; 4];
-            for four in values {
-                lanes
-                    .iter_mut()
-                    .zip(four)
-                    .for_each(|(sum, &v)| *sum += f64::from(v) * f64::from(v));
-            }
-            lanes.iter().sum::<f64>() + rest
-        })
-        .collect();
-    let n: usize = pieces.iter().map(|piece| piece.as_ref().len()).sum();
-    sums.iter().sum::<f64>() / n as f64
 }

@@ -16,18 +16,12 @@ use stereology_spectrum::{Complex, RealFft, frequency};
 use crate::PyramidError;
 use crate::bank::most_levels;
 use crate::filters::{Directions, band_response};
+use crate::reweight::Change;
 
 /// Steps of the tables of responses, up to the corner of the cube.
-const STEPS: usize = 1 << 12;
+pub(crate) const STEPS: usize = 1 << 12;
 /// Planes of frequencies are summed in this many blocks.
 const BLOCKS: usize = 16;
-/// Sweeps of [`Cuts::bring_variances`].
-const SWEEPS: usize = 4;
-/// Strength of its steps: a step of 1 falls short, since all cuts share the same waves.
-const STRENGTH: f64 = 1.5;
-/// Weight of the cuts along the axes in it; the others have 1.
-const WEIGHT_OF_AXES: f64 = 3.0;
-
 /// Mean squares of the pyramid bands of all cuts of a periodic volume (z, y, x) by planes of each normal (x, y, z): for every
 /// normal the high-pass, each level with its orientations added up, and the low-pass (the mean of the volume included).
 ///
@@ -184,29 +178,26 @@ pub(crate) fn face_diagonals() -> Vec<Unit<Vector3<f64>>> {
     ])
 }
 
-/// Axes, face diagonals and space diagonals, each with its weight; the weights add up to one.
-fn weighted_normals() -> (Vec<Unit<Vector3<f64>>>, Vec<f64>) {
+/// Normals along the space diagonals.
+pub(crate) fn space_diagonals() -> Vec<Unit<Vector3<f64>>> {
+    normals(&[[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]])
+}
+
+/// Axes (x, y, z), face diagonals and space diagonals.
+pub(crate) fn thirteen_normals() -> Vec<Unit<Vector3<f64>>> {
     let mut all = vec![Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
     all.extend(face_diagonals());
-    all.extend(normals(&[
-        [1.0, 1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [1.0, 1.0, -1.0],
-    ]));
-    let weight = |i: usize| if i < 3 { WEIGHT_OF_AXES } else { 1.0 };
-    let sum: f64 = (0..all.len()).map(weight).sum();
-    let weights = (0..all.len()).map(|i| weight(i) / sum).collect();
-    (all, weights)
+    all.extend(space_diagonals());
+    all
 }
 
 /// The transform of volumes of one size, and the squared responses of the bands.
 pub(crate) struct Cuts {
-    fft: RealFft<f32>,
+    pub(crate) fft: RealFft<f32>,
     size: [usize; 3],
-    tables: Vec<Vec<f64>>,
-    spectrum: Vec<Complex<f32>>,
-    work: stereology_spectrum::Work<f32>,
+    pub(crate) tables: Vec<Vec<f64>>,
+    pub(crate) spectrum: Vec<Complex<f32>>,
+    pub(crate) work: stereology_spectrum::Work<f32>,
 }
 
 impl Cuts {
@@ -221,107 +212,88 @@ impl Cuts {
         }
     }
 
-    fn transform(&mut self, field: &[f32]) {
+    pub(crate) fn transform(&mut self, field: &[f32]) {
         self.fft.forward_into(field, &mut self.spectrum, &mut self.work);
     }
 
     /// For each normal: high-pass, levels, low-pass.
     pub(crate) fn variances(&mut self, field: &[f32], normals: &[Unit<Vector3<f64>>]) -> Vec<Vec<f64>> {
         self.transform(field);
-        let power = self.power_by_radius(normals, None);
+        let power = self.power_by_radius(normals, None).0;
         self.band_powers(&power, (field.len() as f64).powi(-2))
     }
 
-    /// Changes the power of the field's waves as little as brings the band variances of the cuts along the axes, face
-    /// diagonals and space diagonals near those wanted (high-pass, levels, low-pass; zero where none is), axes first.
-    ///
-    /// ```text
-    /// P(k) ← P(k) Π_n Π_b (wanted_b / found_{n,b})^(s w_n G_b²(κ_n)),   Σ w_n = 1
-    /// ```
-    #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
-    pub(crate) fn bring_variances(&mut self, field: &mut [f32], wanted: &[f64]) {
-        let (normals, weights) = weighted_normals();
-        self.transform(field);
-        let per_sample = 1.0 / field.len() as f32;
-        self.spectrum.par_iter_mut().for_each(|v| *v *= per_sample);
-        let mut power = self.power_by_radius(&normals, None);
-        for _ in 0..SWEEPS {
-            let found = self.band_powers(&power, 1.0);
-            let tables: Vec<Vec<f64>> = found
-                .iter()
-                .zip(&weights)
-                .map(|(found, weight)| {
-                    let exponent = |(&found, &wanted): (&f64, &f64)| {
-                        let ratio = if found > 0.0 && wanted > 0.0 {
-                            wanted / found
-                        } else {
-                            1.0
-                        };
-                        0.5 * STRENGTH * weight * ratio.ln()
-                    };
-                    let exponents: Vec<f64> = found.iter().zip(wanted).map(exponent).collect();
-                    let at = |i: usize| exponents.iter().zip(&self.tables).map(|(e, table)| e * table[i]).sum();
-                    (0..STEPS + 2).map(at).collect()
-                })
-                .collect();
-            power = self.power_by_radius(&normals, Some(&tables));
-        }
-        self.fft.inverse_into(&mut self.spectrum, field, &mut self.work);
-    }
-
-    /// Power by the radius of the tangential frequency, for every normal, shared out between neighbouring steps; each wave is
-    /// first multiplied by the exponential of the sum of the normals' `factors` at its radii.
+    /// Power of the transform by the radius of the tangential frequency, for every normal; and, if waves are `changed`, what
+    /// is asked about them afterwards.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "radii are at most √3 < 2, factors are kept in f32"
+        reason = "radii are at most √3 < 2"
     )]
-    fn power_by_radius(&mut self, normals: &[Unit<Vector3<f64>>], factors: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
+    pub(crate) fn power_by_radius(
+        &mut self,
+        normals: &[Unit<Vector3<f64>>],
+        changed: Option<&Change<'_>>,
+    ) -> (Vec<Vec<f64>>, Vec<f64>) {
         let (size, half) = (self.size, self.size[2] / 2 + 1);
-        let planes = size[0].div_ceil(BLOCKS);
+        let rows = (size[0] * size[1]).div_ceil(BLOCKS);
         // One sum a block, added in order: the same bits at any number of threads.
-        let blocks: Vec<Vec<Vec<f64>>> = self
+        let blocks: Vec<(Vec<Vec<[f64; 2]>>, Vec<f64>)> = self
             .spectrum
-            .par_chunks_mut(planes * half * size[1])
+            .par_chunks_mut(rows * half)
             .enumerate()
             .map(|(block, bins)| {
-                let mut sums = vec![vec![0.0; STEPS + 2]; normals.len()];
-                let mut positions = vec![(0_usize, 0.0); normals.len()];
-                for (i, bin) in bins.iter_mut().enumerate() {
-                    let (row, x) = (block * planes * size[1] + i / half, i % half);
-                    let k = wave(size, row, x);
-                    for (position, normal) in positions.iter_mut().zip(normals) {
-                        let exact = 0.5 * radius(size, row, x, &k, normal) * STEPS as f64;
-                        *position = (exact as usize, exact - exact.floor());
+                let mut sums = vec![vec![[0.0; 2]; STEPS + 1]; normals.len()];
+                let mut products = Vec::new();
+                let mut positions = vec![vec![0.0_f32; half]; normals.len()];
+                let mut power = vec![0.0_f64; half];
+                for (i, bins) in bins.chunks_exact_mut(half).enumerate() {
+                    let row = block * rows + i;
+                    for (positions, normal) in positions.iter_mut().zip(normals) {
+                        positions_of_row(size, row, normal, positions);
                     }
-                    if let Some(tables) = factors {
-                        let log: f64 = tables
-                            .iter()
-                            .zip(&positions)
-                            .map(|(table, &(i, part))| table[i] + part * (table[i + 1] - table[i]))
-                            .sum();
-                        *bin *= log.exp() as f32;
+                    if let Some(change) = changed {
+                        change.apply(bins, &positions);
                     }
-                    let twice = if x == 0 || 2 * x == size[2] { 1.0 } else { 2.0 };
-                    let power = twice * f64::from(bin.norm_sqr());
-                    for (sums, &(i, part)) in sums.iter_mut().zip(&positions) {
-                        sums[i] += (1.0 - part) * power;
-                        sums[i + 1] += part * power;
+                    for (x, (power, bin)) in power.iter_mut().zip(bins.iter()).enumerate() {
+                        let twice = if x == 0 || 2 * x == size[2] { 1.0 } else { 2.0 };
+                        *power = twice * f64::from(bin.norm_sqr());
+                    }
+                    for (sums, positions) in sums.iter_mut().zip(&positions) {
+                        for (&position, &power) in positions.iter().zip(&power) {
+                            let sum = &mut sums[position as usize];
+                            sum[0] += power;
+                            sum[1] += f64::from(position - position.floor()) * power;
+                        }
+                    }
+                    if let Some(change) = changed {
+                        change.add_products(size, row, &positions, &power, &mut products);
                     }
                 }
-                sums
+                (sums, products)
             })
             .collect();
-        (0..normals.len())
+        let power = (0..normals.len())
             .map(|n| {
-                (0..STEPS + 2)
-                    .map(|i| blocks.iter().map(|block| block[n][i]).sum())
-                    .collect()
+                let mut power = vec![0.0; STEPS + 2];
+                for (sums, _) in &blocks {
+                    for (i, [all, above]) in sums[n].iter().enumerate() {
+                        power[i] += all - above;
+                        power[i + 1] += above;
+                    }
+                }
+                power
             })
-            .collect()
+            .collect();
+        let mut products = Vec::new();
+        for (_, of_block) in &blocks {
+            products.resize(of_block.len(), 0.0);
+            products.iter_mut().zip(of_block).for_each(|(sum, v)| *sum += v);
+        }
+        (power, products)
     }
 
-    fn band_powers(&self, power: &[Vec<f64>], scale: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn band_powers(&self, power: &[Vec<f64>], scale: f64) -> Vec<Vec<f64>> {
         let dot = |power: &[f64], table: &[f64]| scale * power.iter().zip(table).map(|(p, t)| p * t).sum::<f64>();
         power
             .iter()
@@ -350,6 +322,32 @@ fn radius(size: [usize; 3], row: usize, x: usize, k: &Vector3<f64>, normal: &Uni
         .zip(along)
         .any(|(&(i, n), a)| 2 * i == n && a.abs() < 1.0 - 1e-12);
     if ambiguous { radius.max(1.0) } else { radius }
+}
+
+/// Places in the tables of the radii of the tangential frequencies of a row of bins: see [`radius`].
+#[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
+fn positions_of_row(size: [usize; 3], row: usize, normal: &Unit<Vector3<f64>>, positions: &mut [f32]) {
+    let start = wave(size, row, 0);
+    // |κ|² = a + b x + c x² along the row.
+    let step = 1.0 / size[2] as f64;
+    let a = (start.norm_squared() - start.dot(normal).powi(2)) as f32;
+    let b = (-2.0 * start.dot(normal) * normal.x * step) as f32;
+    let c = ((1.0 - normal.x.powi(2)) * step * step) as f32;
+    for (x, position) in positions.iter_mut().enumerate() {
+        let x = x as f32;
+        *position = (a + x * (b + x * c)).max(0.0).sqrt() * STEPS as f32;
+    }
+    let oblique = |along: f64| along.abs() < 1.0 - 1e-12;
+    let (y, z) = (row % size[1], row / size[1]);
+    let nyquist = 0.5 * STEPS as f32;
+    if (2 * y == size[1] && oblique(normal.y)) || (2 * z == size[0] && oblique(normal.z)) {
+        positions.iter_mut().for_each(|i| *i = i.max(nyquist));
+    } else if size[2].is_multiple_of(2)
+        && oblique(normal.x)
+        && let Some(last) = positions.last_mut()
+    {
+        *last = last.max(nyquist);
+    }
 }
 
 /// A function of a band's squared response, tabulated over the radius.

@@ -141,6 +141,12 @@ impl Prepared {
     }
 
     /// Whether a component varies enough to have a texture.
+    /// Share of the variance that a component has.
+    pub(crate) fn share(&self, component: usize) -> f64 {
+        let variances = self.colours.variances();
+        variances[component] / variances.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
     pub(crate) fn varies(&self, component: usize) -> bool {
         let variances = self.colours.variances();
         variances[component] > 1e-12 && variances[component] > 1e-9 * variances[0]

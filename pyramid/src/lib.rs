@@ -15,17 +15,18 @@
 //! Giving 3D bands the distributions of 2D bands ([`Mode::Volume`], the method of 1995 and 2004) makes slices that are too
 //! smooth, because a slice sees every wave of the volume that crosses it: their band variances miss the photograph's by
 //! 20 to 40 %, however many rounds. [`Mode::Spectrum`] inverts the relation between the spectra first;
-//! [`Mode::Slices`], the default, then matches the bands of the slices and of oblique planes themselves, keeps the power the same in all directions
-//! and the slices about equally strong; [`Mode::Oriented`] takes an exemplar an axis. Root mean square of ln(band variance /
-//! the exemplar's) and mean Wasserstein distance of bands (in standard deviations), over the slices of 64³ in colour
-//! after 5 rounds, and processor seconds at 128³ on a busy 2020s server core:
+//! [`Mode::Slices`], the default, then matches the bands of the slices and of oblique planes themselves, keeps the power the
+//! same in all directions and the slices about equally strong, and at the end gives cuts of all directions the right band
+//! variances at once; [`Mode::Oriented`] takes an exemplar an axis. Root mean square of ln(band variance / the exemplar's) and
+//! mean Wasserstein distance of bands (in standard deviations), over the slices and over the oblique cuts of 64³ in colour after
+//! 5 rounds, and processor seconds at 128³ on a busy 2020s server core:
 //!
-//! | | granite | terrazzo | seconds |
-//! |---|---|---|---|
-//! | volume | .383 / .149 | .348 / .108 | 3.0 |
-//! | spectrum | .011 / .012 | .031 / .023 | 3.1 |
-//! | slices | .008 / .008 | .003 / .009 | 19.3 |
-//! | slices, no oblique rounds | .001 / .008 | .005 / .012 | 13.5 |
+//! | | granite, slices | oblique | terrazzo, slices | oblique | seconds |
+//! |---|---|---|---|---|---|
+//! | volume | .383 / .149 | .40 / .15 | .348 / .108 | .36 / .09 | 3.5 |
+//! | spectrum | .011 / .012 | .021 / .016 | .031 / .023 | .020 / .022 | 3.6 |
+//! | slices, [`Cut::Axes`] | .001 / .008 | .025 / .018 | .007 / .012 | .013 / .022 | 9.8 |
+//! | slices | .001 / .009 | .002 / .010 | .002 / .010 | .003 / .012 | 13.7 |
 //!
 //! But for `Oriented` the volume is isotropic: orientations are pooled. Bands capture no long edges or letters, as in any Heeger-Bergen
 //! texture. Results have the same bits at any number of threads; between processor types the last bits may differ.
@@ -79,6 +80,8 @@ mod oblique;
 mod options;
 mod plan;
 mod pyramid_error;
+mod reweight;
+mod slice_matching;
 mod slice_spectrum;
 mod steerable;
 mod targets;
@@ -92,7 +95,7 @@ pub use colour::PrincipalColours;
 pub use cuts::{cut_band, cut_variances};
 pub use exemplar::Exemplar;
 pub use matching::{MatchError, Quantiles, match_histogram, match_histogram_table};
-pub use options::{Edges, Finding, Matching, Mode, TextureError, TextureOptions, TextureReport};
+pub use options::{Cut, Edges, Finding, Matching, Mode, TextureError, TextureOptions, TextureReport};
 pub use pyramid_error::PyramidError;
 pub use slice_spectrum::{VolumeSpectrum, slice_spectrum, volume_spectrum};
 pub use steerable::{Gain, SteerablePyramid};

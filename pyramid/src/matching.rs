@@ -152,7 +152,7 @@ pub fn match_histogram(values: &mut [f32], reference: &Quantiles) -> Result<(), 
 /// ```
 pub fn match_histogram_table(values: &mut [f32], reference: &Quantiles) -> Result<(), MatchError> {
     finite(values)?;
-    match_by_table(&mut [values], reference);
+    match_by_table(values, reference);
     Ok(())
 }
 
@@ -192,12 +192,14 @@ pub(crate) fn match_exactly(pieces: &mut [&mut [f32]], reference: &Quantiles) {
     }
 }
 
-/// Sorts keys by their upper halves, equal ones in the order they come: three passes over 11 bits each.
+/// Sorts keys by their upper halves, equal ones in the order they come: by digits from the last to the first.
 #[allow(clippy::cast_possible_truncation, reason = "digits are masked")]
 fn sorted_by_value(mut keys: Vec<u64>) -> Vec<u64> {
-    const DIGITS: usize = 1 << 11;
-    let digit = |key: u64, pass: usize| (key >> (32 + 11 * pass)) as usize & (DIGITS - 1);
-    let mut counts = vec![[0_usize; DIGITS]; 3];
+    const BITS: usize = 8;
+    const DIGITS: usize = 1 << BITS;
+    const PASSES: usize = 32 / BITS;
+    let digit = |key: u64, pass: usize| (key >> (32 + BITS * pass)) as usize & (DIGITS - 1);
+    let mut counts = [[0_usize; DIGITS]; PASSES];
     for &key in &keys {
         for (pass, counts) in counts.iter_mut().enumerate() {
             counts[digit(key, pass)] += 1;
@@ -225,53 +227,140 @@ fn ordered_bits(value: f32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// As [`match_exactly`], by a table. A constant becomes the reference's median.
-pub(crate) fn match_by_table(pieces: &mut [&mut [f32]], reference: &Quantiles) {
-    let blocks = || pieces.par_iter().flat_map_iter(|piece| piece.chunks(BLOCK));
-    let (lowest, highest) = blocks()
-        .map(|values| {
-            values
-                .iter()
-                .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)))
-        })
-        .reduce(
-            || (f32::INFINITY, f32::NEG_INFINITY),
-            |a, b| (a.0.min(b.0), a.1.max(b.1)),
-        );
-    let scale = TABLE as f32 / (highest - lowest);
-    if !(scale.is_finite() && scale > 0.0) {
-        let median = reference.at(0.5);
-        pieces.iter_mut().for_each(|piece| piece.fill(median));
-        return;
+/// What a table needs to know of values before it is made, and their power.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    pub(crate) lowest: f32,
+    pub(crate) highest: f32,
+    /// Sum of squares.
+    pub(crate) power: f64,
+}
+
+impl Extent {
+    const NOTHING: Self = Self {
+        lowest: f32::INFINITY,
+        highest: f32::NEG_INFINITY,
+        power: 0.0,
+    };
+
+    /// Of many values: one extent a block, joined in order.
+    pub(crate) fn of(values: &[f32]) -> Self {
+        let blocks: Vec<Self> = values.par_chunks(BLOCK).map(Self::of_block).collect();
+        blocks.into_iter().fold(Self::NOTHING, Self::with)
     }
-    // Counts are whole numbers: they add up to the same in any order.
-    let counts = blocks()
-        .fold(
-            || vec![0_u64; TABLE],
-            |mut counts, values| {
-                for &v in values {
-                    counts[bin(v, lowest, scale).0] += 1;
-                }
-                counts
-            },
-        )
-        .reduce(|| vec![0; TABLE], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
-    let n = counts.iter().sum::<u64>() as f64;
-    let mut below = 0_u64;
-    let mut edges = Vec::with_capacity(TABLE + 1);
-    edges.push(reference.at(0.0));
-    for count in counts {
-        below += count;
-        edges.push(reference.at(below as f64 / n));
+
+    fn of_block(values: &[f32]) -> Self {
+        let mut low = [f32::INFINITY; 8];
+        let mut high = [f32::NEG_INFINITY; 8];
+        let mut power = [0.0_f64; 8];
+        let eights = values.chunks_exact(8);
+        for (i, &v) in eights.remainder().iter().enumerate() {
+            low[i] = v;
+            high[i] = v;
+            power[i] = f64::from(v) * f64::from(v);
+        }
+        for eight in eights {
+            for (i, &v) in eight.iter().enumerate() {
+                low[i] = if v < low[i] { v } else { low[i] };
+                high[i] = if v > high[i] { v } else { high[i] };
+                power[i] += f64::from(v) * f64::from(v);
+            }
+        }
+        Self {
+            lowest: low.into_iter().fold(f32::INFINITY, f32::min),
+            highest: high.into_iter().fold(f32::NEG_INFINITY, f32::max),
+            power: power.iter().sum(),
+        }
     }
-    pieces.par_iter_mut().for_each(|piece| {
-        piece.par_chunks_mut(BLOCK).for_each(|values| {
+
+    /// Of these values and others.
+    pub(crate) fn with(self, other: Self) -> Self {
+        Self {
+            lowest: self.lowest.min(other.lowest),
+            highest: self.highest.max(other.highest),
+            power: self.power + other.power,
+        }
+    }
+
+    /// Of the values times a positive factor.
+    pub(crate) fn scaled(self, factor: f32) -> Self {
+        Self {
+            lowest: factor * self.lowest,
+            highest: factor * self.highest,
+            power: f64::from(factor).powi(2) * self.power,
+        }
+    }
+}
+
+/// A map of values that brings one distribution to another: linear in each of [`TABLE`] bins.
+pub(crate) struct Table {
+    lowest: f32,
+    /// Bins per unit of value; zero for a constant.
+    scale: f32,
+    /// Value at the lower edge of each bin, and how much more at the upper.
+    bins: Vec<[f32; 2]>,
+}
+
+impl Table {
+    /// For pieces of values, each times its factor, that have the `extent` together. A constant becomes the median.
+    pub(crate) fn new(pieces: &[(&[f32], f32)], extent: Extent, reference: &Quantiles) -> Self {
+        let lowest = extent.lowest;
+        let scale = TABLE as f32 / (extent.highest - lowest);
+        if !(scale.is_finite() && scale > 0.0) {
+            return Self {
+                lowest: 0.0,
+                scale: 0.0,
+                bins: vec![[reference.at(0.5), 0.0]],
+            };
+        }
+        // Counts are whole numbers: they add up to the same in any order.
+        let counts = pieces
+            .par_iter()
+            .flat_map_iter(|&(piece, factor)| piece.chunks(BLOCK).map(move |values| (values, factor)))
+            .fold(
+                || vec![0_u64; TABLE],
+                |mut counts, (values, factor)| {
+                    for &v in values {
+                        counts[bin(factor * v, lowest, scale).0] += 1;
+                    }
+                    counts
+                },
+            )
+            .reduce(|| vec![0; TABLE], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
+        let n = counts.iter().sum::<u64>() as f64;
+        let mut below = 0_u64;
+        let mut edge = reference.at(0.0);
+        let bins = counts
+            .into_iter()
+            .map(|count| {
+                below += count;
+                let before = std::mem::replace(&mut edge, reference.at(below as f64 / n));
+                [before, edge - before]
+            })
+            .collect();
+        Self { lowest, scale, bins }
+    }
+
+    /// Puts the values, times a factor, through the map.
+    pub(crate) fn apply(&self, values: &mut [f32], factor: f32) {
+        values.par_chunks_mut(BLOCK).for_each(|values| {
+            if self.scale == 0.0 {
+                values.fill(self.bins[0][0]);
+                return;
+            }
             for v in values {
-                let (i, part) = bin(*v, lowest, scale);
-                *v = edges[i] + part * (edges[i + 1] - edges[i]);
+                let (i, part) = bin(factor * *v, self.lowest, self.scale);
+                let [edge, step] = self.bins[i];
+                *v = edge + part * step;
             }
         });
-    });
+    }
+}
+
+/// As [`match_exactly`], by a table, for one piece.
+pub(crate) fn match_by_table(values: &mut [f32], reference: &Quantiles) {
+    let table = Table::new(&[(values, 1.0)], Extent::of(values), reference);
+    table.apply(values, 1.0);
 }
 
 #[allow(

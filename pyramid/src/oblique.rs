@@ -1,15 +1,17 @@
 //! The bands on planes that lie obliquely to the volume's axes, given the exemplar's distributions.
 //!
 //! On the planes normal to n, a 2D pyramid is a family of 3D filters of the tangential frequency (see `cuts`). Their squares add
-//! up to one, so what is taken apart by them is put together by their conjugates, as on the slices along an axis. The planes
-//! taken are those normal to the face diagonals: each holds an axis, along which a band of level l keeps one sample of 2^l.
+//! up to one, so what is taken apart by them is put together by their conjugates, as on the slices along an axis.
+//!
+//! A band whose filter ends at the radius ρ fills a cylinder of frequencies about n. Along the axis a, the cylinder is
+//! 2ρ / √(1 − n_a²) thick, so samples that lie 1 / thickness apart along a hold all of it: its frequencies overlap nowhere when
+//! they are folded. Coarse bands so need a part of the samples only, along y and z, and along x if that lies in the planes.
 
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
 use stereology_spectrum::{Complex, RealFft, Work, frequency};
 
 use crate::Matching;
-use crate::bank::level_shape;
 use crate::canvas::match_band;
 use crate::cuts::Frame;
 use crate::filters::{Directions, band_response};
@@ -18,19 +20,22 @@ use crate::targets::BandTargets;
 /// Steps of the tables of responses, over radii from 0 to 2.
 const STEPS: usize = 1 << 12;
 
-/// Transforms, tables and buffers of the oblique bands of volumes of one size.
+/// Tables and buffers of the oblique bands of volumes of one size.
 pub(crate) struct Oblique {
     size: [usize; 3],
     plane: Directions,
     /// Response of high-pass, levels, low-pass over the radius.
     tables: Vec<Vec<f32>>,
+    /// Of the oriented bands: the root, by the power of the cosine, of response times gain.
+    roots: Vec<Vec<f32>>,
     full: Grid,
-    /// By the axis along which samples are left out, and by level from 1.
-    thinned: [Vec<Grid>; 3],
+    /// Smaller grids, made when a normal first asks for them.
+    thinned: Vec<Grid>,
     spectrum: Vec<Complex<f32>>,
     sum: Vec<Complex<f32>>,
     bins: Vec<Complex<f32>>,
     values: Vec<f32>,
+    radial: Vec<f32>,
 }
 
 struct Grid {
@@ -59,27 +64,29 @@ impl Oblique {
     pub(crate) fn new(size: [usize; 3], levels: usize, orientations: usize) -> Self {
         let full = Grid::new(size);
         let zero = Complex::new(0.0, 0.0);
-        let table = |band| {
-            let response = |i: usize| band_response(2.0 * i as f64 / STEPS as f64, band, levels) as f32;
-            (0..STEPS + 2).map(response).collect()
+        let plane = Directions::plane(orientations);
+        let response = |i: usize, band| band_response(2.0 * i as f64 / STEPS as f64, band, levels);
+        let table = |band| (0..STEPS + 2).map(|i| response(i, band) as f32).collect();
+        let (gain, root) = (
+            f64::from(plane.signed_gain().abs()),
+            1.0 / f64::from(plane.power().max(1)),
+        );
+        let root = |band| {
+            (0..STEPS + 2)
+                .map(|i| (gain * response(i, band)).powf(root) as f32)
+                .collect()
         };
-        let thinned = [0, 1, 2].map(|axis| {
-            let grid = |level| {
-                let mut small = size;
-                small[axis] = level_shape(&[size[axis]], &[], level)[0];
-                Grid::new(small)
-            };
-            (1..=levels).map(grid).collect()
-        });
         Self {
             size,
-            plane: Directions::plane(orientations),
             tables: (0..levels + 2).map(table).collect(),
+            roots: (0..levels + 2).map(root).collect(),
+            plane,
             spectrum: vec![zero; full.bins()],
             sum: vec![zero; full.bins()],
             bins: vec![zero; full.bins()],
+            radial: vec![0.0; full.bins()],
             values: vec![0.0; full.fft.samples()],
-            thinned,
+            thinned: Vec::new(),
             full,
         }
     }
@@ -94,150 +101,321 @@ impl Oblique {
         matching: Matching,
     ) -> (f64, usize) {
         let (levels, k) = (self.tables.len() - 2, self.plane.count());
-        let frame = Frame::of(normal);
-        // The array's axis (z, y, x) that lies in the planes.
-        let axis = [normal.z, normal.y, normal.x].iter().position(|n| n.abs() < 1e-12);
         self.full
             .fft
             .forward_into(field, &mut self.spectrum, &mut self.full.work);
         let scale = 1.0 / field.len() as f32;
         self.spectrum.par_iter_mut().for_each(|v| *v *= scale);
-        self.sum.fill(Complex::new(0.0, 0.0));
+        self.sum.par_iter_mut().for_each(|v| *v = Complex::new(0.0, 0.0));
         let (mut errors, mut count) = (0.0, 0);
-        for (index, target) in targets.of_band.iter().enumerate() {
-            let (band, orientation) = match index {
-                0 => (0, None),
-                i if i > levels * k => (levels + 1, None),
-                i => (1 + (i - 1) / k, Some((i - 1) % k)),
+        for band in 0..levels + 2 {
+            let orientations = if band == 0 || band > levels { 1 } else { k };
+            let ends = 0.5_f64.powi(i32::try_from(band).unwrap_or(i32::MAX) - 1);
+            let small = thinned(self.size, normal, ends);
+            let grid = if small == self.size {
+                &mut self.full
+            } else {
+                let known = self.thinned.iter().position(|grid| grid.size == small);
+                let at = known.unwrap_or_else(|| {
+                    self.thinned.push(Grid::new(small));
+                    self.thinned.len() - 1
+                });
+                &mut self.thinned[at]
             };
-            let grid = match axis {
-                Some(axis) if band > 1 => &mut self.thinned[axis][band - 2],
-                _ => &mut self.full,
+            let mut filter = Filter {
+                large: self.size,
+                small,
+                frame: Frame::of(normal),
+                ends: if band == 0 { f64::INFINITY } else { ends },
+                radial: &mut self.radial,
             };
-            let filter = Filter {
-                size: self.size,
-                frame: &frame,
-                table: &self.tables[band],
-                orientation: orientation.map(|b| (&self.plane, b)),
+            let power = if orientations == 1 { 0 } else { self.plane.power() };
+            let table = if power == 0 {
+                &self.tables[band]
+            } else {
+                &self.roots[band]
             };
-            let odd = orientation.is_some() && self.plane.quadrature();
-            let bins = &mut self.bins[..grid.bins()];
-            let values = &mut self.values[..grid.fft.samples()];
-            filter.take(&self.spectrum, bins, grid.size, odd);
-            grid.fft.inverse_into(bins, values, &mut grid.work);
-            if let Some(target) = target
-                && let Some(error) = match_band(values, &targets.targets[*target], matching)
-            {
-                errors += error * error;
-                count += 1;
+            filter.fill_radial(table, power > 0);
+            for b in 0..orientations {
+                let index = if band == 0 { 0 } else { 1 + (band - 1) * k + b };
+                let direction = (power > 0).then(|| Direction {
+                    along: [self.plane.vectors()[b][2], self.plane.vectors()[b][1]],
+                    power,
+                    sign: self.plane.signed_gain().signum(),
+                    odd: self.plane.quadrature(),
+                });
+                let bins = &mut self.bins[..grid.bins()];
+                let values = &mut self.values[..grid.fft.samples()];
+                filter.take(&self.spectrum, bins, direction.as_ref());
+                grid.fft.inverse_into(bins, values, &mut grid.work);
+                if let Some(target) = targets.of_band[index]
+                    && let Some(error) = match_band(values, &targets.targets[target], matching)
+                {
+                    errors += error * error;
+                    count += 1;
+                }
+                grid.fft.forward_into(values, bins, &mut grid.work);
+                filter.add(&mut self.sum, bins, direction.as_ref());
             }
-            grid.fft.forward_into(values, bins, &mut grid.work);
-            filter.add(&mut self.sum, bins, grid.size, odd);
         }
         self.full.fft.inverse_into(&mut self.sum, field, &mut self.full.work);
         (errors, count)
     }
 }
 
-/// One 2D filter on the planes of a normal, as a 3D filter.
+/// Samples along each axis (z, y, x) that hold the cylinder of frequencies about a normal whose radius is `ends` of Nyquist.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a whole number of samples, at most the volume's"
+)]
+fn thinned(size: [usize; 3], normal: &Unit<Vector3<f64>>, ends: f64) -> [usize; 3] {
+    let along = [normal.z, normal.y, normal.x];
+    let mut small = [0, 1, 2].map(|axis| {
+        let across = (1.0 - along[axis] * along[axis]).sqrt();
+        // One more: the ends of the cylinder, where the filter is zero, may fall upon one another, but not be taken for Nyquist.
+        let fewest = (size[axis] as f64 * ends / across.max(1e-9)).ceil() as usize + 2;
+        (fewest..size[axis]).find(|&n| is_smooth(n)).unwrap_or(size[axis])
+    });
+    // The last axis keeps half of its frequencies, which cannot be folded, and of two axes at right angles to which no wave of the
+    // cylinder is long, only one can be thinned.
+    if along[2].abs() > 1e-12 {
+        small[2] = size[2];
+    } else {
+        small[1] = size[1];
+    }
+    small
+}
+
+fn is_smooth(mut n: usize) -> bool {
+    for prime in [2, 3, 5] {
+        while n.is_multiple_of(prime) {
+            n /= prime;
+        }
+    }
+    n == 1
+}
+
+/// An orientation in the planes.
+struct Direction {
+    /// Along the frame's two directions.
+    along: [f64; 2],
+    power: i32,
+    sign: f32,
+    odd: bool,
+}
+
+/// The filters of one band on the planes of a normal, as 3D filters.
 struct Filter<'a> {
-    size: [usize; 3],
-    frame: &'a Frame,
-    table: &'a [f32],
-    orientation: Option<(&'a Directions, usize)>,
+    large: [usize; 3],
+    small: [usize; 3],
+    frame: Frame,
+    /// Radius beyond which there is no response.
+    ends: f64,
+    /// What all orientations have in common, on the large grid: the response, or its root over the radius.
+    radial: &'a mut [f32],
 }
 
 impl Filter<'_> {
-    /// The filtered spectrum on a smaller grid.
-    fn take(&self, spectrum: &[Complex<f32>], bins: &mut [Complex<f32>], small: [usize; 3], odd: bool) {
-        let (half, small_half) = (self.size[2] / 2 + 1, small[2] / 2 + 1);
+    fn fill_radial(&mut self, table: &[f32], over_radius: bool) {
+        let size = self.large;
+        let (half, n) = (size[2] / 2 + 1, self.frame.normal);
+        // A bin at the Nyquist frequency of an axis stands for both signs: see `cuts`.
+        let oblique = |along: f64| along.abs() < 1.0 - 1e-12;
+        let frame = &self.frame;
+        let ends = self.ends;
+        self.radial.par_chunks_mut(half).enumerate().for_each(|(row, radial)| {
+            let (z, y) = (row / size[1], row % size[1]);
+            let range = row_range(frame, ends, size, z, y);
+            let ambiguous = (2 * z == size[0] && oblique(n.z)) || (2 * y == size[1] && oblique(n.y));
+            let [a, b] = along_row(frame, size, z, y);
+            for x in range {
+                let (ka, kb) = (a.at(x), b.at(x));
+                let radius = (ka * ka + kb * kb).sqrt();
+                let alone = ambiguous || (2 * x == size[2] && oblique(n.x));
+                let response = at(table, if alone { radius.max(1.0) } else { radius });
+                radial[x] = if over_radius {
+                    response / radius.max(1e-9)
+                } else {
+                    response
+                };
+            }
+        });
+    }
+
+    /// The filtered spectrum, folded upon a smaller grid.
+    fn take(&self, spectrum: &[Complex<f32>], bins: &mut [Complex<f32>], direction: Option<&Direction>) {
+        let (large, small) = (self.large, self.small);
+        let (half, small_half) = (large[2] / 2 + 1, small[2] / 2 + 1);
         bins.par_chunks_mut(small[1] * small_half)
             .enumerate()
             .for_each(|(z, plane)| {
-                let z = large_index(z, small[0], self.size[0]);
-                for (y, bins) in plane.chunks_exact_mut(small_half).enumerate() {
-                    let y = large_index(y, small[1], self.size[1]);
-                    let from = &spectrum[(z * self.size[1] + y) * half..];
-                    let pairs = bins.iter_mut().zip(from);
-                    self.row(z, y, pairs, |(out, v), f| {
-                        *out = if odd { Complex::new(-v.im * f, v.re * f) } else { v * f };
-                    });
+                plane.fill(Complex::new(0.0, 0.0));
+                for z in unfolded(z, small[0], large[0]) {
+                    for (y, bins) in plane.chunks_exact_mut(small_half).enumerate() {
+                        for y in unfolded(y, small[1], large[1]) {
+                            let row = z * large[1] + y;
+                            let range = row_range(&self.frame, self.ends, large, z, y);
+                            let from = &spectrum[row * half..][..half];
+                            let pairs = bins[range.clone()].iter_mut().zip(&from[range.clone()]);
+                            self.row(
+                                z,
+                                y,
+                                range,
+                                direction,
+                                pairs,
+                                |(out, v), f| *out += v * f,
+                                |(out, v), f| {
+                                    *out += Complex::new(-v.im * f, v.re * f);
+                                },
+                            );
+                        }
+                    }
                 }
             });
     }
 
-    /// Adds the transform of a band on a smaller grid, filtered by the conjugate.
-    fn add(&self, sum: &mut [Complex<f32>], bins: &[Complex<f32>], small: [usize; 3], odd: bool) {
-        let (half, small_half) = (self.size[2] / 2 + 1, small[2] / 2 + 1);
+    /// Adds the transform of a band on the smaller grid, unfolded and filtered by the conjugate.
+    fn add(&self, sum: &mut [Complex<f32>], bins: &[Complex<f32>], direction: Option<&Direction>) {
+        let (large, small) = (self.large, self.small);
+        let (half, small_half) = (large[2] / 2 + 1, small[2] / 2 + 1);
         let scale = 1.0 / small.iter().product::<usize>() as f32;
-        sum.par_chunks_mut(self.size[1] * half)
-            .enumerate()
-            .for_each(|(z, plane)| {
-                let Some(from_z) = small_index(z, small[0], self.size[0]) else {
-                    return;
-                };
-                for (y, sum) in plane.chunks_exact_mut(half).enumerate() {
-                    let Some(from_y) = small_index(y, small[1], self.size[1]) else {
-                        continue;
-                    };
-                    let start = (from_z * small[1] + from_y) * small_half;
-                    let pairs = sum.iter_mut().zip(&bins[start..start + small_half]);
-                    self.row(z, y, pairs, |(out, v), f| {
-                        let f = f * scale;
-                        *out += if odd { Complex::new(v.im * f, -v.re * f) } else { v * f };
-                    });
-                }
-            });
+        sum.par_chunks_mut(half).enumerate().for_each(|(row, sum)| {
+            let (z, y) = (row / large[1], row % large[1]);
+            let from = folded(z, small[0], large[0]) * small[1] + folded(y, small[1], large[1]);
+            let range = row_range(&self.frame, self.ends, large, z, y);
+            let bins = &bins[from * small_half..][..small_half];
+            let pairs = sum[range.clone()].iter_mut().zip(&bins[range.clone()]);
+            self.row(
+                z,
+                y,
+                range,
+                direction,
+                pairs,
+                |(out, v), f| *out += v * (f * scale),
+                |(out, v), f| {
+                    let f = f * scale;
+                    *out += Complex::new(v.im * f, -v.re * f);
+                },
+            );
+        });
     }
 
-    /// Calls `f(item, response)` along the bins of a row of the large grid.
-    #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
-    fn row<I>(&self, z: usize, y: usize, items: impl Iterator<Item = I>, f: impl Fn(I, f32)) {
-        let size = self.size;
-        let [a, b] = self.frame.along;
-        let n = self.frame.normal;
-        let start = Vector3::new(0.0, frequency(y, size[1]), frequency(z, size[0]));
-        let step = 2.0 / size[2] as f64;
-        let (a0, b0) = ((2.0 * start.dot(&a)) as f32, (2.0 * start.dot(&b)) as f32);
-        let (da, db) = ((step * a.x) as f32, (step * b.x) as f32);
-        // A bin at the Nyquist frequency of an axis stands for both signs: see `cuts`.
-        let oblique = |along: f64| along.abs() < 1.0 - 1e-12;
-        let ambiguous = (2 * z == size[0] && oblique(n.z)) || (2 * y == size[1] && oblique(n.y));
-        let (power, gain, cos, sin) = self.orientation.map_or((0, 1.0, 0.0, 0.0), |(plane, b)| {
-            let v = plane.vectors()[b];
-            (plane.power(), plane.signed_gain(), v[2] as f32, v[1] as f32)
-        });
-        for (x, item) in items.enumerate() {
-            let (ka, kb) = (a0 + x as f32 * da, b0 + x as f32 * db);
-            let radius = (ka * ka + kb * kb).sqrt();
-            let alone = ambiguous || (2 * x == size[2] && oblique(n.x));
-            let response = at(self.table, if alone { radius.max(1.0) } else { radius });
-            let response = if power == 0 || response == 0.0 {
-                response
-            } else {
-                response * gain * ((ka * cos + kb * sin) / radius.max(1e-9)).powi(power)
-            };
-            f(item, response);
+    /// Calls `even(item, response)`, or `odd` for an odd filter, along the bins of a row of the large grid.
+    #[allow(
+        clippy::too_many_arguments,
+        clippy::cast_possible_truncation,
+        reason = "an inner loop; kept in f32"
+    )]
+    fn row<I>(
+        &self,
+        z: usize,
+        y: usize,
+        range: std::ops::Range<usize>,
+        direction: Option<&Direction>,
+        items: impl Iterator<Item = I>,
+        even: impl Fn(I, f32),
+        odd: impl Fn(I, f32),
+    ) {
+        let radial = &self.radial[(z * self.large[1] + y) * (self.large[2] / 2 + 1)..];
+        let items = items.zip(&radial[range.clone()]);
+        let Some(direction) = direction else {
+            items.for_each(|(item, &f)| even(item, f));
+            return;
+        };
+        let [a, b] = along_row(&self.frame, self.large, z, y);
+        let [cos, sin] = direction.along.map(|v| v as f32);
+        let along = Line {
+            start: a.start * cos + b.start * sin,
+            step: a.step * cos + b.step * sin,
+        };
+        let items = items.zip(range);
+        let sign = direction.sign;
+        match (direction.power, direction.odd) {
+            (3, true) => items.for_each(|((item, &f), x)| {
+                let t = f * along.at(x);
+                odd(item, sign * t * t * t);
+            }),
+            (power, true) => items.for_each(|((item, &f), x)| odd(item, sign * (f * along.at(x)).powi(power))),
+            (power, false) => items.for_each(|((item, &f), x)| even(item, sign * (f * along.at(x)).powi(power))),
         }
     }
 }
 
-/// Where a bin of an axis of `small` samples lies among those of `large`.
-fn large_index(k: usize, small: usize, large: usize) -> usize {
-    if 2 * k < small || small == large {
-        k
-    } else {
-        k + large - small
+/// A number along the bins of a row.
+#[derive(Clone, Copy)]
+struct Line {
+    start: f32,
+    step: f32,
+}
+
+impl Line {
+    fn at(self, x: usize) -> f32 {
+        self.start + x as f32 * self.step
     }
 }
 
-/// The inverse of [`large_index`], for bins that have one.
-fn small_index(k: usize, small: usize, large: usize) -> Option<usize> {
-    if 2 * k < small || small == large {
-        Some(k)
-    } else {
-        k.checked_sub(large - small).filter(|&k| 2 * k >= small)
+/// Tangential frequency of the bins of a row along the frame's two directions, Nyquist 1.
+#[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
+fn along_row(frame: &Frame, size: [usize; 3], z: usize, y: usize) -> [Line; 2] {
+    let start = Vector3::new(0.0, frequency(y, size[1]), frequency(z, size[0]));
+    frame.along.map(|direction| Line {
+        start: (2.0 * start.dot(&direction)) as f32,
+        step: (2.0 / size[2] as f64 * direction.x) as f32,
+    })
+}
+
+/// The bins of a row whose tangential frequency is shorter than `ends`: κ² = a + 2 b x + c x² along it.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the bins of a row"
+)]
+fn row_range(frame: &Frame, ends: f64, size: [usize; 3], z: usize, y: usize) -> std::ops::Range<usize> {
+    let half = size[2] / 2 + 1;
+    if ends.is_infinite() {
+        return 0..half;
     }
+    let step = 2.0 / size[2] as f64;
+    let start = 2.0 * Vector3::new(0.0, frequency(y, size[1]), frequency(z, size[0]));
+    let n = frame.normal;
+    let a = start.norm_squared() - start.dot(&n).powi(2);
+    let b = -start.dot(&n) * n.x * step;
+    let c = (1.0 - n.x * n.x) * step * step;
+    if c < 1e-12 * step * step {
+        return if a < ends * ends { 0..half } else { 0..0 };
+    }
+    let root = b * b - c * (a - ends * ends);
+    if root <= 0.0 {
+        return 0..0;
+    }
+    let (low, high) = ((-b - root.sqrt()) / c, (-b + root.sqrt()) / c);
+    let first = low.max(0.0).ceil() as usize;
+    let end = (high.min(half as f64 - 1.0).max(-1.0).floor() + 1.0) as usize;
+    first.min(end)..end
+}
+
+/// Where a bin of an axis of `large` samples falls among those of `small`.
+fn folded(k: usize, small: usize, large: usize) -> usize {
+    if small == large {
+        k
+    } else if 2 * k < large {
+        k % small
+    } else {
+        (small - (large - k) % small) % small
+    }
+}
+
+/// The bins of an axis of `large` samples that fall upon a bin of `small`.
+fn unfolded(k: usize, small: usize, large: usize) -> impl Iterator<Item = usize> {
+    let whole = small == large;
+    let (below, above) = (large.div_ceil(2), large - large.div_ceil(2));
+    let positive = (k..if whole { k + 1 } else { below }).step_by(small);
+    let back = if k == 0 { small } else { small - k };
+    let negative = (back..if whole { 0 } else { above + 1 })
+        .step_by(small)
+        .map(move |back| large - back);
+    positive.chain(negative)
 }
 
 #[allow(
@@ -255,7 +433,7 @@ fn at(table: &[f32], radius: f32) -> f32 {
 mod tests {
     use super::Oblique;
     use crate::Matching;
-    use crate::cuts::{Cuts, face_diagonals};
+    use crate::cuts::{Cuts, face_diagonals, space_diagonals};
     use crate::plan::white_noise;
     use crate::targets::BandTargets;
 
@@ -263,16 +441,21 @@ mod tests {
     /// add up to one and thinning loses nothing.
     #[test]
     fn fields_come_back_from_their_oblique_bands() {
-        for size in [[16, 16, 16], [19, 24, 33]] {
+        for (size, levels, orientations) in [
+            ([16, 16, 16], 2, 4),
+            ([19, 24, 33], 2, 4),
+            ([48, 40, 64], 3, 3),
+            ([33, 65, 47], 3, 9),
+        ] {
             let samples: usize = size.iter().product();
             let noise = white_noise(samples, size[2], 1, 0);
-            for normal in face_diagonals() {
+            for normal in face_diagonals().into_iter().chain(space_diagonals()) {
                 let mut field = noise.clone();
                 let nothing = BandTargets {
                     targets: Vec::new(),
-                    of_band: vec![None; 2 + 2 * 4],
+                    of_band: vec![None; 2 + levels * orientations],
                 };
-                Oblique::new(size, 2, 4).match_cuts(&mut field, &normal, &nothing, Matching::Exact);
+                Oblique::new(size, levels, orientations).match_cuts(&mut field, &normal, &nothing, Matching::Exact);
                 let worst = field.iter().zip(&noise).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
                 assert!(worst < 2e-5, "{size:?}, {normal:?}: {worst}");
             }
@@ -302,7 +485,7 @@ mod tests {
         };
         let mut field = smoothed(&model, 1);
         let before = error(&field);
-        Cuts::new([n; 3], levels).bring_variances(&mut field, &wanted);
+        Cuts::new([n; 3], levels).reweight(&mut field, &wanted, &mut None);
         let after = error(&field);
         assert!(after < 0.25 * before, "{before} {after}");
     }

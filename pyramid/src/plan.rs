@@ -1,5 +1,7 @@
 //! What is settled before a synthesis starts: levels, memory, and the noise it starts from.
 
+use std::ops::ControlFlow;
+
 use ndarray::{Array, Dimension, IntoDimension};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +10,13 @@ use rayon::prelude::*;
 
 use crate::bank::{level_shape, most_levels};
 use crate::exemplar::Prepared;
-use crate::{Exemplar, Finding, TextureError, TextureOptions, TextureReport};
+use crate::{Exemplar, Finding, Matching, Mode, TextureError, TextureOptions, TextureReport};
 
 /// Samples along the shortest side of the coarsest oriented bands that the default number of levels leaves.
 const COARSEST: usize = 16;
+
+/// Is told the part done and the report so far, and says whether to go on.
+pub(crate) type Watch<'a> = &'a (dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync);
 
 pub(crate) struct Plan {
     pub(crate) levels: usize,
@@ -42,7 +47,7 @@ impl Plan {
                 orientations: options.orientations,
             });
         }
-        let bytes = bytes_needed(shape, channels, options.orientations);
+        let bytes = bytes_needed(shape, channels, options);
         if bytes > u128::from(options.memory_limit) {
             return Err(TextureError::TooLarge {
                 shape: shape.to_vec(),
@@ -82,19 +87,29 @@ impl Plan {
             levels: self.levels,
             band_errors: Vec::new(),
             slice_errors: Vec::new(),
+            final_error: 0.0,
             findings,
         }
     }
 }
 
-/// Bytes a synthesis asks for at its peak, about: components, channels and the interleaved result, and the coefficients of
-/// one component with their spectra.
-fn bytes_needed(shape: &[usize], channels: usize, orientations: usize) -> u128 {
+/// Bytes a synthesis asks for at its peak, about: components, channels and the interleaved result; the coefficients of one
+/// component (of all, for an image) with their spectra; for a volume, the spectra that cuts are weighed by, and in
+/// [`Mode::Slices`] those of an oblique band; and two lists of places for each band that is sorted at the same time.
+fn bytes_needed(shape: &[usize], channels: usize, options: &TextureOptions) -> u128 {
     let samples = shape.iter().fold(1_u128, |all, &n| all.saturating_mul(n as u128));
     let colours = 3 * channels as u128;
-    let coefficients = 4 + 4 * orientations as u128 / 3;
-    let together = if shape.len() == 2 { channels as u128 } else { 1 };
-    samples.saturating_mul(4 * (colours + together * coefficients))
+    let coefficients = 4 + 4 * options.orientations as u128 / 3;
+    let sorted = match options.matching {
+        Matching::Exact => 5 * rayon::current_num_threads().min(1 + options.orientations) as u128,
+        Matching::Table => 0,
+    };
+    let floats = match (shape.len(), options.mode) {
+        (2, _) => channels as u128 * coefficients + sorted,
+        (_, Mode::Slices) => coefficients + 13 + sorted,
+        _ => coefficients + 4 + sorted,
+    };
+    samples.saturating_mul(4 * (colours + floats))
 }
 
 /// Gaussian noise of unit variance: one random stream a row of `row` samples, so that any thread can make any row.

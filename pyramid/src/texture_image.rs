@@ -51,7 +51,7 @@ pub fn synthesize_image(
     options: &TextureOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<Array3<f32>, TextureError> {
-    synthesize_image_with_report(exemplar, size, options, progress).map(|(image, _)| image)
+    synthesize_image_with_report(exemplar, size, options, &|done, _| progress(done)).map(|(image, _)| image)
 }
 
 /// As [`synthesize_image`], with a report of what was done: levels used, how the bands converged, what to know.
@@ -69,7 +69,7 @@ pub fn synthesize_image(
 ///
 /// let grey = Array3::from_elem((16, 16, 3), 0.5);
 /// let (texture, report) = synthesize_image_with_report(
-///     &Exemplar::new(grey.view()), [8, 8], &TextureOptions::default(), &|_| ControlFlow::Continue(()),
+///     &Exemplar::new(grey.view()), [8, 8], &TextureOptions::default(), &|_, _| ControlFlow::Continue(()),
 /// )?;
 /// assert!(texture.iter().all(|v| (v - 0.5).abs() < 1e-6));
 /// assert_eq!(report.findings[0].code, "constant-exemplar");
@@ -79,7 +79,7 @@ pub fn synthesize_image_with_report(
     exemplar: &Exemplar<'_>,
     size: [usize; 2],
     options: &TextureOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    watch: &(dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync),
 ) -> Result<(Array3<f32>, TextureReport), TextureError> {
     let plan = Plan::new(&[*exemplar], &size, options)?;
     let exemplar = Prepared::new(&[*exemplar], options.edges)?;
@@ -106,16 +106,27 @@ pub fn synthesize_image_with_report(
         })
         .collect();
     let mut canvas = Canvas::new(start, &exemplar, options.matching);
+    let mut coefficients = vec![Vec::new(); count];
     for round in 0..options.iterations {
         canvas.match_channels();
         let errors: Vec<(f64, usize)> = canvas
             .components
             .par_iter_mut()
+            .zip(&mut coefficients)
             .zip(&targets)
-            .filter_map(|(field, targets)| Some(match_bands(field, &bank, targets.as_ref()?, options.matching, 0.0)))
+            .filter_map(|((field, coefficients), targets)| {
+                Some(match_bands(
+                    field,
+                    &bank,
+                    targets.as_ref()?,
+                    options.matching,
+                    0.0,
+                    coefficients,
+                ))
+            })
             .collect();
         report.band_errors.push(root_mean_square(&errors));
-        if progress((round + 1) as f64 / options.iterations as f64).is_break() {
+        if watch((round + 1) as f64 / options.iterations as f64, &report).is_break() {
             return Err(TextureError::Cancelled);
         }
     }

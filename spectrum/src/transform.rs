@@ -463,17 +463,21 @@ fn transform_lanes<T: Real>(
     lanes: &mut [Complex<T>],
     scratch: &mut [Complex<T>],
 ) {
+    // Rows are turned to lanes several at a time: that many values fill a cache line of a lane at once.
+    const ROWS: usize = 8;
     let (n, columns) = matrix.dim();
     let lanes = &mut lanes[..n * columns];
-    for (i, row) in matrix.rows().into_iter().enumerate() {
-        for (j, value) in row.iter().enumerate() {
-            lanes[j * n + i] = *value;
+    for (block, rows) in matrix.axis_chunks_iter(Axis(0), ROWS).enumerate() {
+        for (lane, column) in lanes.chunks_exact_mut(n).zip(rows.columns()) {
+            let lane = &mut lane[block * ROWS..];
+            lane.iter_mut().zip(column).for_each(|(to, from)| *to = *from);
         }
     }
     plan.process_with_scratch(lanes, scratch);
-    for (i, mut row) in matrix.rows_mut().into_iter().enumerate() {
-        for (j, value) in row.iter_mut().enumerate() {
-            *value = lanes[j * n + i];
+    for (block, mut rows) in matrix.axis_chunks_iter_mut(Axis(0), ROWS).enumerate() {
+        for (lane, column) in lanes.chunks_exact(n).zip(rows.columns_mut()) {
+            let lane = &lane[block * ROWS..];
+            column.into_iter().zip(lane).for_each(|(to, from)| *to = *from);
         }
     }
 }

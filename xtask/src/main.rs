@@ -58,9 +58,12 @@ enum Task {
     },
     /// Times our tasks beside other programs' and writes docs/bench-report.md; run it in release
     BenchReport {
-        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx, rtree; spheropack); without it our times stand alone
+        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx, rtree; spheropack; pyrtools); without it our times stand alone
         #[arg(long)]
         python: Option<PathBuf>,
+        /// Only the section of this title
+        #[arg(long)]
+        only: Option<String>,
     },
     /// Makes the built-in sample and its truth anew
     Sample,
@@ -99,7 +102,11 @@ fn main() -> Result<()> {
             Ok(())
         }
         Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
-        Task::BenchReport { python } => bench_report::run(&root()?.join("docs/bench-report.md"), python.as_deref()),
+        Task::BenchReport { python, only } => bench_report::run(
+            &root()?.join("docs/bench-report.md"),
+            python.as_deref(),
+            only.as_deref(),
+        ),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),
     }

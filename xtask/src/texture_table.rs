@@ -59,7 +59,7 @@ pub fn run(data: &Path, results: &Path, page: &Path) -> Result<()> {
             let mut sum = [0.0; 12];
             for seed in 0..SEEDS {
                 let options = TextureOptions::default().with_mode(mode).with_seed(seed);
-                let go = |_: f64| ControlFlow::Continue(());
+                let go = |_: f64, _: &_| ControlFlow::Continue(());
                 let (volume, _) =
                     synthesize_volume_with_report(&Exemplar::new(exemplar.view()), [SIDE; 3], &options, &go)?;
                 if seed == 0 && mode == Mode::Slices {

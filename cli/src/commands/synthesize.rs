@@ -246,7 +246,12 @@ impl Synthesize {
         let report = |of: &Option<TextureReport>| {
             of.as_ref().map_or(
                 Value::Null,
-                |of| json!({ "levels": of.levels, "band_errors": of.band_errors }),
+                |of| {
+                    json!({
+                        "levels": of.levels, "band_errors": of.band_errors, "slice_errors": of.slice_errors, "final_error": of.final_error,
+                        "settled": of.has_settled(),
+                    })
+                },
             )
         };
         let pixel = synthesis.details.residual.voxel;

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
 use image::codecs::png::PngEncoder;
@@ -9,7 +10,7 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use ndarray::{Array3, Axis};
 use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
 use stereology::pyramid::{
-    self, Exemplar, TextureOptions, synthesize_image_with_report, synthesize_oriented_volume,
+    self, Exemplar, TextureOptions, TextureReport, synthesize_image_with_report, synthesize_oriented_volume,
     synthesize_volume_with_report,
 };
 use stereology::segment::read_photo;
@@ -65,15 +66,24 @@ pub struct Choices {
     /// Orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
-    /// Rounds of `slices` that match oblique planes in place of the axes' slices; 0 is faster
-    #[arg(long, value_name = "N", default_value_t = 2)]
-    pub oblique_rounds: usize,
+    /// Which cuts of a volume of mode `slices` look like the picture
+    #[arg(long, value_enum, default_value_t = Cuts::All)]
+    pub cuts: Cuts,
     /// How values are given another distribution
     #[arg(long, value_enum, default_value_t = Matching::Table)]
     pub matching: Matching,
     /// How the picture's borders are kept out of its statistics
     #[arg(long, value_enum, default_value_t = Edges::PeriodicComponent)]
     pub borders: Edges,
+}
+
+/// Which cuts look like the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Cuts {
+    /// Cuts in all directions
+    All,
+    /// Slices along the axes: a third faster
+    Axes,
 }
 
 /// How values are given another distribution.
@@ -138,7 +148,10 @@ impl Choices {
             .with_mode(mode.way())
             .with_iterations(self.iterations)
             .with_orientations(self.orientations)
-            .with_oblique_rounds(self.oblique_rounds)
+            .with_cuts(match self.cuts {
+                Cuts::All => pyramid::Cut::All,
+                Cuts::Axes => pyramid::Cut::Axes,
+            })
             .with_matching(match self.matching {
                 Matching::Table => pyramid::Matching::Table,
                 Matching::Exact => pyramid::Matching::Exact,
@@ -190,19 +203,26 @@ impl Texture {
         let samples: Vec<Array3<f32>> = pictures.iter().map(|picture| samples(picture, channels)).collect();
         let exemplars: Vec<Exemplar<'_>> = samples.iter().map(|samples| Exemplar::new(samples.view())).collect();
         let step = Step::begin("texture", everywhere.quiet);
-        let progress = |done: f64| step.at(done);
+        let said = AtomicUsize::new(0);
+        let watch = |done: f64, report: &TextureReport| {
+            let rounds = report.band_errors.len();
+            if said.swap(rounds, Ordering::Relaxed) < rounds {
+                step.say(&round_told(report));
+            }
+            step.at(done)
+        };
         let (shape, report) = match target {
             Target::Picture(size) => {
-                let (made, report) = synthesize_image_with_report(&exemplars[0], size, &options, &progress).at(path)?;
+                let (made, report) = synthesize_image_with_report(&exemplars[0], size, &options, &watch).at(path)?;
                 go_on()?;
                 write_picture(&self.output, &made)?;
                 (made.shape().to_vec(), report)
             }
             Target::Volume(size, format) => {
                 let (made, report) = if several {
-                    synthesize_oriented_volume(&exemplars, size, &options, &progress)
+                    synthesize_oriented_volume(&exemplars, size, &options, &watch)
                 } else {
-                    synthesize_volume_with_report(&exemplars[0], size, &options, &progress)
+                    synthesize_volume_with_report(&exemplars[0], size, &options, &watch)
                 }
                 .at(path)?;
                 go_on()?;
@@ -244,16 +264,24 @@ impl Texture {
             ));
         if !report.slice_errors.is_empty() {
             answer.line(format!(
-                "slices off by, after each round: {}",
-                listed(&report.slice_errors)
+                "cuts off by, after each round: {}; at the end: {:.4}",
+                listed(&report.slice_errors),
+                report.final_error
             ));
         }
+        answer.line(if report.has_settled() {
+            "settled: more rounds would change little"
+        } else {
+            "not settled: more --iterations may bring the bands nearer"
+        });
         answer
             .field("shape", shape)
             .field("mode", mode.name())
             .field("iterations", self.choices.iterations)
             .field("levels", report.levels)
             .field("orientations", self.choices.orientations)
+            .field("settled", report.has_settled())
+            .field("final_error", report.final_error)
             .field("band_errors", report.band_errors)
             .field("slice_errors", report.slice_errors);
         for finding in &report.findings {
@@ -285,6 +313,15 @@ impl Texture {
             _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),
         }
     }
+}
+
+/// The last round, for people who watch.
+fn round_told(report: &TextureReport) -> String {
+    let rounds = report.band_errors.len();
+    let before = report.band_errors.last().copied().unwrap_or_default();
+    let after = report.slice_errors.last();
+    let after = after.map_or(String::new(), |error| format!(", cuts off by {error:.4} after it"));
+    format!("texture round {rounds}: bands off by {before:.4} before it{after}")
 }
 
 /// Errors for people.

@@ -195,3 +195,70 @@ fn outputs_in_the_way() {
     );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
 }
+
+/// What a texture cannot be made of or made to is said with its numbers; what can be mended is mended and said.
+#[test]
+fn textures_out_of_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&folder, name);
+    image::RgbImage::from_fn(7, 20, |x, y| image::Rgb([(31 * x + 17 * y) as u8; 3]))
+        .save(at("narrow.png"))
+        .unwrap();
+    let error = refused(1, &["texture", &at("narrow.png"), "--size", "16", "-o", &at("a.npy")]);
+    assert!(error.contains("20 x 7") && error.contains("8 x 8"), "{error}");
+    let error = refused(1, &["pyramid", &at("narrow.png"), "--levels", "1"]);
+    assert!(error.contains('7'), "{error}");
+
+    write_discs(at("discs.png"));
+    let error = refused(1, &["texture", &at("discs.png"), "--size", "4000", "-o", &at("a.npy")]);
+    let bytes = error.split_whitespace().filter_map(|word| word.parse::<u128>().ok());
+    assert!(bytes.max() > Some(10_u128.pow(12)), "{error}");
+    let error = refused(
+        1,
+        &["texture", &at("discs.png"), "--size", "16,7,16", "-o", &at("a.npy")],
+    );
+    assert!(error.contains("at least 8"), "{error}");
+
+    let warned = |picture: &str, levels: &str, code: &str| {
+        let (file, out) = (at(picture), at(&format!("{code}.npy")));
+        let made = answer(&[
+            "texture",
+            &file,
+            "--size",
+            "16",
+            "--iterations",
+            "1",
+            "--levels",
+            levels,
+            "-o",
+            &out,
+        ]);
+        assert_eq!(made["warnings"][0]["code"], code, "{made}");
+        made
+    };
+    let made = warned("discs.png", "30", "levels-reduced");
+    assert_eq!(made["levels"], 2);
+    image::RgbImage::from_pixel(20, 20, image::Rgb([90, 140, 40]))
+        .save(at("flat.png"))
+        .unwrap();
+    warned("flat.png", "1", "constant-exemplar");
+    // One channel constant, the others not.
+    image::RgbImage::from_fn(20, 20, |x, y| {
+        image::Rgb([(31 * x + 17 * y * y) as u8, 128, (7 * x * y) as u8])
+    })
+    .save(at("green.png"))
+    .unwrap();
+    answer(&[
+        "texture",
+        &at("green.png"),
+        "--size",
+        "16",
+        "--iterations",
+        "1",
+        "-o",
+        &at("green.npy"),
+    ]);
+    let volume = fs::read(at("green.npy")).unwrap();
+    let values = &volume[volume.len() - 16 * 16 * 16 * 3..];
+    assert!(values.chunks(3).all(|colour| colour[1] == 128));
+}

@@ -340,6 +340,8 @@ fn textures_and_their_bands() {
         &volume,
     ]);
     assert_eq!(made["shape"], serde_json::json!([16, 20, 24, 3]));
+    assert_eq!(made["slice_errors"].as_array().unwrap().len(), 1);
+    assert!(made["final_error"].as_f64().unwrap() < 0.2 && made["settled"].is_boolean());
     assert!(fs::metadata(&volume).unwrap().len() > 16 * 20 * 24 * 3);
     answer(&[
         "texture",

@@ -36,6 +36,19 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 
+    /// So do they from pyramids of several levels, at odd and unequal sides.
+    #[test]
+    fn volumes_come_back_from_several_levels(z in 16_usize..40, y in 16_usize..40, x in 16_usize..40, axes in family(), seed in 0_u64..99) {
+        let volume = noise(seed, [z, y, x]);
+        let pyramid = VolumePyramid::new([z, y, x], [1.0; 3], 2, axes).unwrap();
+        let back = pyramid.reconstruct(&pyramid.build(volume.view()).unwrap());
+        prop_assert!(volume.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 1e-12));
+        let single = volume.mapv(|v| v as f32);
+        let pyramid = VolumePyramid::new([z, y, x], [1.0; 3], 2, axes).unwrap();
+        let back = pyramid.reconstruct(&pyramid.build(single.view()).unwrap());
+        prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
+    }
+
     /// A family of axes shares out the power of every direction evenly (tightness): Σ (v·u)^2p = n/(2p + 1).
     #[test]
     fn axes_are_tight(a in -1.0_f64..1.0, b in -1.0_f64..1.0, c in 0.1_f64..1.0) {

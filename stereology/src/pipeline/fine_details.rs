@@ -81,7 +81,7 @@ pub fn fine_details(
     let mut warnings = Vec::new();
     let mut part = |mask: &Array2<bool>, of: &str, from: f64, seed: u64| {
         let exemplar = Exemplar::new(residual.view()).with_mask(mask.view());
-        let half = |done: f64| progress(from + 0.5 * done);
+        let half = |done: f64, _: &TextureReport| progress(from + 0.5 * done);
         match synthesize_volume_with_report(&exemplar, [voxels; 3], &options.clone().with_seed(seed), &half) {
             Ok((volume, report)) => {
                 for finding in &report.findings {

@@ -6,6 +6,7 @@
 
 mod packing;
 mod section_law;
+mod textures;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,11 +16,14 @@ use rayon::ThreadPool;
 use serde_json::Value;
 
 /// What is measured, in the order of the report.
-const SECTIONS: [fn(&Bench) -> Result<Section>; 2] = [section_law::measure, packing::measure];
+const SECTIONS: [(&str, fn(&Bench) -> Result<Section>); 3] = [
+    ("Section law", section_law::measure),
+    ("Packing", packing::measure),
+    ("Textures", textures::measure),
+];
 
 /// Our tasks against one peer's.
 struct Section {
-    title: &'static str,
     /// What was done by whom, what is counted and what is not.
     words: String,
     /// Name and version of the peer, or why there is none.
@@ -94,23 +98,39 @@ fn cpu_seconds() -> Result<f64> {
     Ok(1e-9 * nanoseconds)
 }
 
-/// Times everything and writes the report.
-pub fn run(document: &Path, python: Option<&Path>) -> Result<()> {
+/// Times everything and writes the report; or the section of one title only, in place of the one that the report has.
+pub fn run(document: &Path, python: Option<&Path>, only: Option<&str>) -> Result<()> {
     let bench = Bench {
         python: python.map(Path::to_owned),
         one_core: rayon::ThreadPoolBuilder::new().num_threads(1).build()?,
     };
+    let old = match only {
+        Some(_) => std::fs::read_to_string(document).with_context(|| document.display().to_string())?,
+        None => String::new(),
+    };
     let mut text = format!(
         "# Times beside other programs\n\nWritten by `cargo run --release -p xtask -- bench-report --python PYTHON`. CPU seconds of one core, the \
-         fewest of several runs, all in one run of the report on {}; ratios carry over to other machines better than seconds.\n",
+         fewest of several runs, each section in one run on {}; ratios carry over to other machines better than seconds.\n",
         processor()
     );
-    for section in SECTIONS {
-        let section = section(&bench)?;
-        println!("{}: {} tasks", section.title, section.rows.len());
-        text += &markdown(&section);
+    for (title, section) in SECTIONS {
+        if only.is_none_or(|only| only.eq_ignore_ascii_case(title)) {
+            let section = section(&bench)?;
+            println!("{title}: {} tasks", section.rows.len());
+            text += &markdown(title, &section);
+        } else if let Some(kept) = section_of(&old, title) {
+            text += kept;
+        }
     }
     std::fs::write(document, text).with_context(|| format!("{} cannot be written", document.display()))
+}
+
+/// A section of a report, with the empty line before it.
+fn section_of<'a>(report: &'a str, title: &str) -> Option<&'a str> {
+    let start = report.find(&format!("\n## {title}\n"))?;
+    let rest = &report[start..];
+    let end = rest[1..].find("\n## ").map_or(rest.len(), |at| at + 1);
+    Some(&rest[..end])
 }
 
 /// The processor's name, where the system tells it.
@@ -123,14 +143,14 @@ fn processor() -> String {
     .to_owned()
 }
 
-fn markdown(section: &Section) -> String {
+fn markdown(title: &str, section: &Section) -> String {
     let (peer, who) = match &section.peer {
         Ok(version) => (version.as_str(), "the peer"),
         Err(missing) => (missing.as_str(), "peer"),
     };
     let mut text = format!(
         "\n## {}\n\n{}\n\nPeer: {peer}.\n\n| task | ours, s | {who}, s | ratio | |\n|---|---|---|---|---|\n",
-        section.title, section.words
+        title, section.words
     );
     for row in &section.rows {
         let (seconds, ratio) = match row.peer {
@@ -159,7 +179,7 @@ fn significant(x: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Row, Section, markdown, significant};
+    use super::{Row, Section, markdown, section_of, significant};
 
     #[test]
     fn numbers_have_two_digits() {
@@ -169,11 +189,19 @@ mod tests {
         );
     }
 
+    /// A section kept from an old report is all of it and nothing else.
+    #[test]
+    fn sections_are_found() {
+        let report = "# T\n\nwords\n\n## A\n\na\n\n## B\n\nb\n";
+        assert_eq!(section_of(report, "A"), Some("\n## A\n\na\n"));
+        assert_eq!(section_of(report, "B"), Some("\n## B\n\nb\n"));
+        assert_eq!(section_of(report, "C"), None);
+    }
+
     /// Without the peer our times stand alone, and the report says why.
     #[test]
     fn a_missing_peer_is_said() {
         let section = |peer, seconds| Section {
-            title: "T",
             words: "w".to_owned(),
             peer,
             rows: vec![Row {
@@ -183,12 +211,15 @@ mod tests {
                 remark: String::new(),
             }],
         };
-        let alone = markdown(&section(Err("not measured: no --python was given".to_owned()), None));
+        let alone = markdown(
+            "T",
+            &section(Err("not measured: no --python was given".to_owned()), None),
+        );
         assert!(
             alone.contains("Peer: not measured") && alone.contains("| cube | 0.50 | – | – |"),
             "{alone}"
         );
-        let both = markdown(&section(Ok("trimesh 4".to_owned()), Some(5.0)));
+        let both = markdown("T", &section(Ok("trimesh 4".to_owned()), Some(5.0)));
         assert!(both.contains("| cube | 0.50 | 5.0 | 10× |"), "{both}");
     }
 }

@@ -81,7 +81,6 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         });
     }
     Ok(Section {
-        title: "Packing",
         words: format!(
             "Sizes lognormal, σ {SIGMA}, the same on both sides; a periodic box; random starts to no overlap, ours with its certificate. Theirs: event-driven \
              growth (Lubachevsky & Stillinger), spheres only."

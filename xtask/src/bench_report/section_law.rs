@@ -73,7 +73,6 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         });
     }
     Ok(Section {
-        title: "Section law",
         words: format!(
             "K of {BINS} bins to a standard error of {TOLERANCE}. Ours: exact in depth, directions until the error is reached. Theirs: `Trimesh.section` by \
              isotropic uniform random planes, `to_2D`, `polygons_full`, areas; the time of one section that hits, the best of three times {PLANES} planes, \

@@ -10,10 +10,13 @@ use nalgebra::{Point3, Vector3};
 use ndarray::{Array3, Array4};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_oriented_volume, synthesize_volume};
+use stereology::pyramid::{
+    Exemplar, Mode, TextureOptions, TextureReport, synthesize_oriented_volume, synthesize_volume,
+};
 use stereology::render::{BlockOptions, render_block};
 
-/// Granite and terrazzo in the modes `slices` and `volume`, layers in the mode `oriented`, each cube beside its exemplar.
+/// Granite and terrazzo in the modes `slices` and `volume`, layered grains in the mode `oriented` from three pictures, each cube beside
+/// its exemplars.
 pub fn draw(folder: &Path) -> Result<()> {
     let go = |_: f64| ControlFlow::Continue(());
     for (name, picture) in [("granite", granite()), ("terrazzo", terrazzo())] {
@@ -25,11 +28,13 @@ pub fn draw(folder: &Path) -> Result<()> {
             drawn.save(folder.join(format!("texture-{name}-{mode_name}.png")))?;
         }
     }
-    let (above, side) = (flakes(60, 1.0), flakes(300, 5.0));
-    let (first, second) = (samples(&above), samples(&side));
-    let exemplars = [Exemplar::new(first.view()), Exemplar::new(second.view())];
-    let (volume, _) = synthesize_oriented_volume(&exemplars, [96; 3], &TextureOptions::default(), &go)?;
-    beside(&beside(&above, &side), &picture_of(&volume)?).save(folder.join("texture-layers-oriented.png"))?;
+    let views = flakes();
+    let three = views.each_ref().map(samples);
+    let exemplars = three.each_ref().map(|view| Exemplar::new(view.view()));
+    let told = |done: f64, _: &TextureReport| go(done);
+    let (volume, _) = synthesize_oriented_volume(&exemplars, [96; 3], &TextureOptions::default(), &told)?;
+    let pictures = beside(&beside(&views[0], &views[1]), &views[2]);
+    beside(&pictures, &picture_of(&volume)?).save(folder.join("texture-layers-oriented.png"))?;
     Ok(())
 }
 
@@ -141,17 +146,31 @@ fn terrazzo() -> RgbImage {
     })
 }
 
-/// Flat grains: `count` of them, as long as they are high times `stretch`; seen from above they are round and as large as they
-/// are long from the side.
-fn flakes(count: usize, stretch: f64) -> RgbImage {
+/// A solid of flat grains, longer along x than along y and thin along z, cut normal to z (rows along y, columns along x), to y (rows
+/// along z, columns along x) and to x (rows along z, columns along y).
+fn flakes() -> [RgbImage; 3] {
+    const LENGTHS: [f64; 3] = [14.0, 8.0, 3.5];
+    let side = f64::from(SIDE);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let seeds = points(&mut rng, count);
+    let count = (side.powi(3) / LENGTHS.iter().product::<f64>()) as usize;
+    let seeds: Vec<[f64; 3]> = (0..count).map(|_| [0; 3].map(|_| side * rng.random::<f64>())).collect();
     let shades: Vec<f64> = seeds.iter().map(|_| 90.0 + 120.0 * rng.random::<f64>()).collect();
-    finished(6, 14.0, |x, y| {
-        let at = [f64::from(x), f64::from(y)];
-        let nearest =
-            (0..seeds.len()).min_by(|&i, &j| apart(seeds[i], at, stretch).total_cmp(&apart(seeds[j], at, stretch)));
+    let colour = |at: [f64; 3]| {
+        let apart = |seed: &[f64; 3]| -> f64 {
+            let of_axis = |i: usize| {
+                let d = (seed[i] - at[i]).abs();
+                d.min(side - d) / LENGTHS[i]
+            };
+            (0..3).map(|i| of_axis(i).powi(2)).sum()
+        };
+        let nearest = (0..count).min_by(|&i, &j| apart(&seeds[i]).total_cmp(&apart(&seeds[j])));
         let shade = shades[nearest.unwrap_or(0)];
         [shade + 18.0, shade + 4.0, shade - 14.0]
-    })
+    };
+    let (middle, at) = (0.5 * side, |i: u32| f64::from(i));
+    [
+        finished(6, 14.0, |x, y| colour([at(x), at(y), middle])),
+        finished(7, 14.0, |x, z| colour([at(x), middle, at(z)])),
+        finished(8, 14.0, |y, z| colour([middle, at(y), at(z)])),
+    ]
 }

@@ -457,7 +457,7 @@ mod tests {
                 };
                 Oblique::new(size, levels, orientations).match_cuts(&mut field, &normal, &nothing, Matching::Exact);
                 let worst = field.iter().zip(&noise).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                assert!(worst < 2e-5, "{size:?}, {normal:?}: {worst}");
+                assert!(worst < 4e-5, "{size:?}, {normal:?}: {worst}");
             }
         }
     }
@@ -471,7 +471,7 @@ mod tests {
             (0..field.len()).map(|i| 0.5 * (field[i] + field[next(i)])).collect()
         };
         let mut model = white_noise(n * n * n, n, 1, 0);
-        for stride in [1, 1, 1, n, n, n, n * n, n * n, n * n] {
+        for stride in [1, n, n * n] {
             model = smoothed(&model, stride);
         }
         let mut cuts = Cuts::new([n; 3], levels);

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! λ is found by Newton's method: the gradient is wanted − found, the Hessian Σ_k P G_b²(κ_n) G_c²(κ_m). The Hessian hardly
-//! changes with P, so it is summed up once, over one row of waves in [`ROWS_ASKED`] and all of the coarsest.
+//! changes with P, so it is summed up once for three steps, over one row of waves in [`ROWS_ASKED`] and all of the coarsest.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -18,7 +18,9 @@ use stereology_spectrum::{Complex, frequency};
 use crate::cuts::{Cuts, STEPS, thirteen_normals};
 
 /// Newton's steps at most.
-const MOST_STEPS: usize = 6;
+const MOST_STEPS: usize = 9;
+/// Steps after which the Hessian is summed up anew.
+const STEPS_OF_HESSIAN: usize = 3;
 /// Largest ln(variance / wanted) that is let be.
 const NEAR_ENOUGH: f64 = 1e-3;
 /// Rows of waves of which one is asked how the bands hang together.
@@ -156,7 +158,11 @@ impl Cuts {
             responses: if known.is_none() { &responses } else { &[] },
             bands,
         };
-        for _ in 0..MOST_STEPS {
+        for step in 0..MOST_STEPS {
+            if step > 0 && step.is_multiple_of(STEPS_OF_HESSIAN) {
+                *known = None;
+                change.responses = &responses;
+            }
             let (power, products) = self.power_by_radius(&normals, Some(&change));
             change.logs.clear();
             if known.is_none() {

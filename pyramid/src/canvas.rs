@@ -228,10 +228,8 @@ fn evening_factors(extents: &[Vec<Extent>], bank: &FilterBank<f32>, evenness: f6
     if evenness == 0.0 {
         return factors;
     }
-    let levels = [0..1]
-        .into_iter()
-        .chain((0..bank.level_count()).map(|l| 1 + l * count..1 + (l + 1) * count));
-    for level in levels {
+    let levels = (0..bank.level_count()).map(|l| 1 + l * count..1 + (l + 1) * count);
+    for level in std::iter::once(0..1).chain(levels) {
         let power = |extents: &Vec<Extent>| extents[level.clone()].iter().map(|e| e.power).sum::<f64>();
         let mean = extents.iter().map(power).sum::<f64>() / extents.len() as f64;
         for (factors, extents) in factors.iter_mut().zip(extents) {

@@ -191,6 +191,9 @@ pub(crate) fn thirteen_normals() -> Vec<Unit<Vector3<f64>>> {
     all
 }
 
+/// Power between two steps of a table, and the part of it that goes to the upper one.
+type Shares = Vec<[f64; 2]>;
+
 /// The transform of volumes of one size, and the squared responses of the bands.
 pub(crate) struct Cuts {
     pub(crate) fft: RealFft<f32>,
@@ -238,7 +241,7 @@ impl Cuts {
         let (size, half) = (self.size, self.size[2] / 2 + 1);
         let rows = (size[0] * size[1]).div_ceil(BLOCKS);
         // One sum a block, added in order: the same bits at any number of threads.
-        let blocks: Vec<(Vec<Vec<[f64; 2]>>, Vec<f64>)> = self
+        let blocks: Vec<(Vec<Shares>, Vec<f64>)> = self
             .spectrum
             .par_chunks_mut(rows * half)
             .enumerate()

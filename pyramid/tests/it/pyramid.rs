@@ -38,11 +38,11 @@ proptest! {
         let levels = 1 + pick % SteerablePyramid::<f64>::most_levels([h, w]);
         let image = noise(seed, h, w);
         let pyramid = SteerablePyramid::new([h, w], levels, k).unwrap();
-        let back = pyramid.reconstruct(&pyramid.build_complex(image.view()).unwrap().real());
+        let back = pyramid.reconstruct(pyramid.build_complex(image.view()).unwrap().real());
         prop_assert!(image.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 1e-12));
         let single = image.mapv(|v| v as f32);
         let pyramid = SteerablePyramid::new([h, w], levels, k).unwrap();
-        let back = pyramid.reconstruct(&pyramid.build_complex(single.view()).unwrap().real());
+        let back = pyramid.reconstruct(pyramid.build_complex(single.view()).unwrap().real());
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::{path, stereology, write_discs};
+use crate::{answer, path, stereology, write_discs};
 
 /// Runs, expects a refusal, gives the message.
 fn refused(code: i32, arguments: &[&str]) -> String {

@@ -15,8 +15,11 @@ use anyhow::{Context, Result, ensure};
 use rayon::ThreadPool;
 use serde_json::Value;
 
+/// Measures the tasks of a section.
+type Measure = fn(&Bench) -> Result<Section>;
+
 /// What is measured, in the order of the report.
-const SECTIONS: [(&str, fn(&Bench) -> Result<Section>); 3] = [
+const SECTIONS: [(&str, Measure); 3] = [
     ("Section law", section_law::measure),
     ("Packing", packing::measure),
     ("Textures", textures::measure),

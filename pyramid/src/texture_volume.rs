@@ -75,7 +75,7 @@ pub fn synthesize_volume(
 /// let (_, report) = synthesize_volume_with_report(
 ///     &Exemplar::new(speckle.view()), [16, 16, 16], &options, &|_, _| ControlFlow::Continue(()),
 /// )?;
-/// assert!(report.band_errors[1] < report.band_errors[0]);
+/// assert!(report.final_error < report.slice_errors[0]);
 /// assert_eq!((report.levels, report.findings[0].code), (2, "levels-reduced"));
 /// # Ok::<(), stereology_pyramid::TextureError>(())
 /// ```

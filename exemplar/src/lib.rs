@@ -1,0 +1,1 @@
+//! Solids from one picture, without separable particles.

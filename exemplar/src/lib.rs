@@ -1,1 +1,3 @@
 //! Solids from one picture, without separable particles.
+
+pub mod measure;

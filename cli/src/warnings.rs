@@ -106,6 +106,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Give the binder's colour with --binder R,G,B, or import a label map with --labels FILE.",
     ),
     (
+        "no-fringes",
+        "No fringe lies wholly inside a slice or the exemplar: lengths and windings could not be measured.",
+        "Nothing for textures without fringes; otherwise larger slices, or --period if the fringes are finer.",
+    ),
+    (
         "no-texture",
         "Too few pixels lie inside the particles (or the binder) to learn their texture: they were left plain.",
         "Use a photograph of higher resolution.",
@@ -131,9 +136,19 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Leave --paper out for densities; use it to compare with the paper's figures.",
     ),
     (
+        "range-guessed",
+        "The samples of a volume do not say which value is white; a range was taken from the data.",
+        "Give --range LOW,HIGH (or --exemplar-range) if black and white are other values.",
+    ),
+    (
         "self-intersection",
         "The mesh seems to cut through itself: sections show another number of profiles than its surface says.",
         "Mend the mesh (a boolean union in a mesh editor).",
+    ),
+    (
+        "slices-left-out",
+        "The volume has more slices than are measured: they were taken at even distances.",
+        "Nothing, or a larger --at-most.",
     ),
     (
         "small-labels",

@@ -3,6 +3,7 @@
 pub mod carve;
 pub mod export;
 pub mod kmatrix;
+pub mod measure;
 pub mod pack;
 mod pack_quality;
 pub mod pyramid;
@@ -51,8 +52,7 @@ pub enum Command {
     Render(render::Render),
     Export(export::Export),
     Carve(carve::Carve),
-    /// Not available yet: measures of a finished solid
-    Measure(Later),
+    Measure(measure::Measure),
     /// Not available yet: a solid from one picture without particles
     Exemplar(Later),
     /// Not available yet: stone grown around measured particles
@@ -95,7 +95,7 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Render(options) => options.run(everywhere).map(Some),
         Command::Export(options) => options.run(everywhere).map(Some),
         Command::Carve(options) => options.run(everywhere).map(Some),
-        Command::Measure(rest) => later("measure", rest),
+        Command::Measure(options) => options.run(everywhere).map(Some),
         Command::Exemplar(rest) => later("exemplar", rest),
         Command::Grow(rest) => later("grow", rest),
         Command::Contact(rest) => later("contact", rest),

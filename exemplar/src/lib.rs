@@ -1,3 +1,4 @@
 //! Solids from one picture, without separable particles.
 
+pub mod grow;
 pub mod measure;

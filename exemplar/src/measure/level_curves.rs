@@ -135,7 +135,9 @@ impl LevelCurve {
     #[must_use]
     pub fn tortuosity(&self) -> Option<f64> {
         match self.points[..] {
-            [first, .., last] if !self.closed && first != last => Some(self.length() / distance(first, last)),
+            [first, .., last] if !self.closed && distance(first, last) > 0.0 => {
+                Some(self.length() / distance(first, last))
+            }
             _ => None,
         }
     }

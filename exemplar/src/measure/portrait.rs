@@ -167,7 +167,6 @@ fn windows(picture: ArrayView2<'_, f32>, [height, width]: [usize; 2]) -> Vec<Arr
         .flat_map(|y| starts(w, width).map(move |x| (y, x)))
         .map(|(y, x)| {
             picture
-                .clone()
                 .slice_axis_move(Axis(0), (y..y + height).into())
                 .slice_axis_move(Axis(1), (x..x + width).into())
         })

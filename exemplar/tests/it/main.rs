@@ -3,3 +3,4 @@
 
 mod boolean_models;
 mod comparisons;
+mod growth;

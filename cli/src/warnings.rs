@@ -86,6 +86,16 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing, or correct them in the tool they come from.",
     ),
     (
+        "measured-as-voxels",
+        "Measurements lie outside the mesh, but are whole numbers that fit as numbers of voxels: they were taken as that.",
+        "Say --measured-in voxels or --measured-in mesh.",
+    ),
+    (
+        "measured-moved",
+        "Measurements just outside the mesh were moved to the nearest voxel inside.",
+        "Nothing for measurements on the surface; otherwise correct their places.",
+    ),
+    (
         "mesh-repaired",
         "The mesh was not quite a closed surface and was repaired.",
         "Look at `repairs`; mend the mesh if that is not what you meant.",
@@ -139,6 +149,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "range-guessed",
         "The samples of a volume do not say which value is white; a range was taken from the data.",
         "Give --range LOW,HIGH (or --exemplar-range) if black and white are other values.",
+    ),
+    (
+        "seeds-added",
+        "Parts of the mesh hang together with no seed by voxels; each was given one.",
+        "Nothing, or a higher --resolution, at which thin parts hang together.",
     ),
     (
         "self-intersection",

@@ -2,6 +2,7 @@
 
 pub mod carve;
 pub mod export;
+pub mod grow;
 pub mod kmatrix;
 pub mod measure;
 pub mod pack;
@@ -55,8 +56,7 @@ pub enum Command {
     Measure(measure::Measure),
     /// Not available yet: a solid from one picture without particles
     Exemplar(Later),
-    /// Not available yet: stone grown around measured particles
-    Grow(Later),
+    Grow(grow::Grow),
     /// Not available yet: contact distributions of a microgeometry
     Contact(Later),
     /// Not available yet: stochastic displacement of a mesh
@@ -97,7 +97,7 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Carve(options) => options.run(everywhere).map(Some),
         Command::Measure(options) => options.run(everywhere).map(Some),
         Command::Exemplar(rest) => later("exemplar", rest),
-        Command::Grow(rest) => later("grow", rest),
+        Command::Grow(options) => options.run(everywhere).map(Some),
         Command::Contact(rest) => later("contact", rest),
         Command::Displace(rest) => later("displace", rest),
         Command::Explore(rest) => later("explore", rest),

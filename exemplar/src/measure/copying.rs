@@ -76,6 +76,7 @@ fn longest_run(sources: impl Iterator<Item = u32>, texels: usize, follows: impl 
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::float_cmp, reason = "values of a test")]
 mod tests {
     use super::copying;
     use ndarray::Array2;

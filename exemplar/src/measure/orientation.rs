@@ -121,6 +121,7 @@ fn box_sums(field: &Array2<f64>) -> Array2<f64> {
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_possible_truncation, clippy::float_cmp, reason = "values of a test")]
 mod tests {
     use super::orientation_field;
     use ndarray::Array2;

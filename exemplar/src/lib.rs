@@ -21,3 +21,5 @@ pub use exemplar::Exemplar;
 pub use options::{Method, Search, SolidOptions, Solver, Views};
 pub use scan::Scan;
 pub use synthesis::{LevelReport, Solid, synthesize_solid};
+pub mod grow;
+pub mod measure;

@@ -55,6 +55,14 @@ impl Field {
         (at[slice] * self.size[row] + at[row]) * self.size[column] + at[column]
     }
 
+    /// Calls `with` the number, in the order of a view, of every voxel that is made or given.
+    pub(crate) fn each_held_in_view(&self, view: usize, mut with: impl FnMut(usize)) {
+        let [_, ny, nx] = self.size;
+        for voxel in (0..self.sources.len()).filter(|&voxel| self.holds(voxel)) {
+            with(self.in_view(view, [voxel / (ny * nx), voxel / nx % ny, voxel % nx]));
+        }
+    }
+
     /// Number of a voxel in (z, y, x) order.
     #[inline]
     pub(crate) fn index(&self, at: [usize; 3]) -> usize {
@@ -81,7 +89,10 @@ impl Field {
         for voxel in 0..n {
             let sheet = sheet_of(rng.random_range(0..views), exemplars);
             let windows = &level.windows[sheet];
-            self.sources[voxel] = windows[rng.random_range(0..windows.len())];
+            let source = windows[rng.random_range(0..windows.len())];
+            if self.is_fixed.is_empty() || !self.is_fixed[voxel] {
+                self.sources[voxel] = source;
+            }
         }
         self.show(level);
     }
@@ -97,7 +108,7 @@ impl Field {
         self.restore_fixed();
     }
 
-    pub(crate) fn restore_fixed(&mut self) {
+    fn restore_fixed(&mut self) {
         for (voxel, fixed) in &self.fixed {
             for (values, &v) in self.values.iter_mut().zip(fixed) {
                 values[*voxel as usize] = v;
@@ -151,7 +162,9 @@ impl Field {
                         .unwrap_or(0);
                     let [_, row, column] = VIEWS[view];
                     let at = [z, y, x];
-                    self.sources[voxel] = child(source, at[row] % 2, at[column] % 2);
+                    if self.is_fixed.is_empty() || !self.is_fixed[voxel] {
+                        self.sources[voxel] = child(source, at[row] % 2, at[column] % 2);
+                    }
                     debug_assert_ne!(self.sources[voxel], NONE);
                     if continuous {
                         for (values, coarse) in self.values.iter_mut().zip(&coarse.values) {

@@ -186,6 +186,12 @@ impl Level {
         made
     }
 
+    /// Value of a channel at a place.
+    #[inline]
+    pub(crate) fn value(&self, channel: usize, place: u32) -> f32 {
+        self.values[channel * self.stride + place as usize]
+    }
+
     /// Is the window about this place complete and of this exemplar?
     #[inline]
     pub(crate) fn fits(&self, place: usize, sheet: usize) -> bool {

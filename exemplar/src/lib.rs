@@ -1,16 +1,22 @@
 //! Solids from one picture, without separable particles.
-#![allow(missing_docs, clippy::all)]
+
 mod batch;
 mod domain;
 mod error;
 mod exemplar;
+mod feature_size;
 mod field;
 mod level;
 mod options;
+mod phases;
 mod principal;
+mod quantiser;
 mod recipe;
 mod scan;
+mod search;
+mod sequential;
 mod similar;
+mod stage;
 mod synthesis;
 mod tallies;
 mod window;

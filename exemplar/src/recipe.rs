@@ -17,91 +17,90 @@ pub(crate) enum Combine {
 #[derive(Clone, Debug)]
 pub(crate) struct Recipe {
     pub(crate) combine: Combine,
-    /// Strength of the colour histogram, 0 without.
+    /// Votes for a colour are multiplied by (expected / found)^this; 0 without a colour histogram.
     pub(crate) colour: f32,
-    /// Strength of the position histogram, 0 without.
+    /// Votes for a pixel used k times too often are divided by 1 + this k; 0 without a position histogram.
     pub(crate) position: f32,
-    /// Strength of the index histogram, 0 without.
+    /// A neighbourhood used k times too often costs this k spreads more; 0 without an index histogram.
     pub(crate) index: f32,
-    pub(crate) settling: f32,
-    pub(crate) roots: usize,
-    pub(crate) edge: f32,
-    pub(crate) floor: f32,
     /// Similar pixels a pixel.
     pub(crate) similar: usize,
-    /// Random candidates of a search.
-    pub(crate) random: usize,
-    /// Neighbourhoods this far away vote, at the beginning.
-    pub(crate) radius: usize,
-    /// Votes come from ever nearer in the last half of the iterations.
-    pub(crate) shrinking: bool,
+    /// Neighbourhoods this far away vote, at first and at last.
+    pub(crate) radii: [usize; 2],
+    /// Weight of a vote from the next voxel, when those within 1 vote; 1 from the voxel itself.
+    pub(crate) edge: f32,
     /// Exemplars are thinned out with the solid.
     pub(crate) thinned: bool,
 }
 
-fn env(name: &str, default: f32) -> f32 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
-
 impl Recipe {
-    pub(crate) fn new(options: &SolidOptions) -> Self {
+    /// The method's recipe; `phases` are kept sharp to the end.
+    pub(crate) fn new(options: &SolidOptions, phases: bool) -> Self {
         let half = options.neighbourhood / 2;
+        // Kopf's solver lets every neighbourhood that covers a voxel vote; urs-2012's the voxel's own.
         let radius = match options.solver() {
-            Solver::Batch => half.min(env("RAD", 9.0) as usize),
+            Solver::Batch => half,
             Solver::Sequential => 0,
         };
-        let recipe = Self {
+        let paper = Self {
             combine: Combine::Discrete,
-            colour: env("COL", 8.0),
-            position: env("POS", 10.0),
-            index: env("IDX", 0.022),
-            floor: env("FLR", 1.0),
-            edge: env("EDGE", 0.25),
-            roots: env("ROOTS", 0.0) as usize,
-            settling: env("SET", 0.5),
+            colour: 0.0,
+            position: 0.0,
+            index: 0.0,
             similar: options.similar.unwrap_or(4),
-            random: env("RND", 0.0) as usize,
-            radius,
-            shrinking: env("SHR", 1.0) > 0.0,
-            thinned: env("THIN", 0.0) > 0.0,
+            radii: [radius; 2],
+            edge: 1.0,
+            thinned: true,
         };
         match options.method {
-            Method::Best => recipe,
+            Method::Best => Self {
+                colour: 8.0,
+                position: 10.0,
+                index: 0.02,
+                radii: [radius.min(2), radius.min(usize::from(!phases))],
+                edge: 0.25,
+                thinned: false,
+                ..paper
+            },
             Method::WeiLevoy => Self {
                 combine: Combine::Mean,
-                colour: 0.0,
-                position: 0.0,
-                index: 0.0,
-                shrinking: false,
-                thinned: true,
-                ..recipe
+                ..paper
             },
             Method::Kopf => Self {
                 combine: Combine::Weighted,
-                position: 0.0,
-                index: 0.0,
-                shrinking: false,
-                thinned: true,
-                ..recipe
+                colour: 8.0,
+                ..paper
             },
             Method::ChenWang => Self {
+                position: 10.0,
+                index: 0.02,
                 similar: options.similar.unwrap_or(15),
-                shrinking: false,
-                thinned: true,
-                ..recipe
+                ..paper
             },
         }
     }
 
-    /// How far away votes come from in an iteration.
+    /// How far away votes come from in an iteration: shrinking evenly in the last half.
     pub(crate) fn radius(&self, iteration: usize, iterations: usize) -> usize {
-        let late = 2 * iteration;
-        if !self.shrinking || late < iterations {
-            return self.radius;
-        }
-        // The last half of the iterations goes through radius - 1 .. 0 evenly.
+        let [first, last] = self.radii;
         let left = iterations - iteration - 1;
-        let half = iterations - iterations.div_ceil(2);
-        (left * self.radius).div_ceil(half.max(1)).min(self.radius).max(env("RMIN", 1.0) as usize)
+        let late = iterations / 2;
+        if left >= late { first } else { last + (left * (first - last)).div_ceil(late) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Recipe;
+    use crate::SolidOptions;
+
+    #[test]
+    fn votes_come_from_ever_nearer() {
+        let recipe = Recipe::new(&SolidOptions::default(), true);
+        let radii: Vec<usize> = (0..10).map(|i| recipe.radius(i, 10)).collect();
+        assert_eq!(radii, [2, 2, 2, 2, 2, 2, 2, 1, 1, 0]);
+        assert_eq!(recipe.radius(0, 1), 2);
+        let grey = Recipe::new(&SolidOptions::default(), false);
+        assert_eq!((grey.radius(0, 10), grey.radius(9, 10)), (2, 1));
     }
 }

@@ -83,6 +83,21 @@ impl Usage {
             .collect()
     }
 
+    /// Uses and target of a place's bin.
+    #[inline]
+    pub(crate) fn of(&self, place: u32) -> Option<(f64, f64)> {
+        let bin = self.bins[place as usize];
+        (bin != NONE).then(|| (self.counts[bin as usize] as f64, self.targets[bin as usize]))
+    }
+
+    /// Raises the prices of bins that are used too often by up to two steps, lowers those of others by up to one.
+    #[allow(clippy::cast_possible_truncation, reason = "a factor of a price")]
+    pub(crate) fn charge(&self, prices: &mut [f32], step: f32) {
+        for ((price, &count), &target) in prices.iter_mut().zip(&self.counts).zip(&self.targets) {
+            *price += step * (count as f64 / target - 1.0).clamp(-1.0, 2.0) as f32;
+        }
+    }
+
     /// Bin of each place, or [`NONE`].
     pub(crate) fn bins(&self) -> &[u32] {
         &self.bins
@@ -137,13 +152,15 @@ impl Colours {
 
     /// (expected / found)^strength of each bin, within 1/16 and 16.
     pub(crate) fn lack(&self, voxels: f64, strength: f32) -> Vec<f32> {
-        self.counts
-            .iter()
-            .zip(&self.shares)
-            .map(|(&count, &share)| {
-                let ratio = (share * voxels + 1.0) / (count as f64 + 1.0);
-                (ratio as f32).powf(strength).clamp(1.0 / 16.0, 16.0)
-            })
+        (0..self.counts.len())
+            .map(|bin| self.lack_of(bin, voxels, strength))
             .collect()
+    }
+
+    /// The same of one bin.
+    #[allow(clippy::cast_possible_truncation, reason = "a factor of a weight")]
+    pub(crate) fn lack_of(&self, bin: usize, voxels: f64, strength: f32) -> f32 {
+        let ratio = (self.shares[bin] * voxels + 1.0) / (self.counts[bin] as f64 + 1.0);
+        (ratio as f32).powf(strength).clamp(1.0 / 16.0, 16.0)
     }
 }

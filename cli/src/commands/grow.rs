@@ -366,7 +366,7 @@ fn as_picture(made: &ArrayView3<'_, f32>) -> image::RgbImage {
 }
 
 /// The mesh of a file or a SHAPE; balls as many triangles.
-fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
+pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
     let path = Path::new(spec);
     let is_file = path
         .extension()

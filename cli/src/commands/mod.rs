@@ -1,6 +1,7 @@
 //! The commands, one module each.
 
 pub mod carve;
+pub mod exemplar;
 pub mod export;
 pub mod grow;
 pub mod kmatrix;
@@ -54,8 +55,7 @@ pub enum Command {
     Export(export::Export),
     Carve(carve::Carve),
     Measure(measure::Measure),
-    /// Not available yet: a solid from one picture without particles
-    Exemplar(Later),
+    Exemplar(exemplar::Exemplar),
     Grow(grow::Grow),
     /// Not available yet: contact distributions of a microgeometry
     Contact(Later),
@@ -96,7 +96,7 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Export(options) => options.run(everywhere).map(Some),
         Command::Carve(options) => options.run(everywhere).map(Some),
         Command::Measure(options) => options.run(everywhere).map(Some),
-        Command::Exemplar(rest) => later("exemplar", rest),
+        Command::Exemplar(options) => options.run(everywhere).map(Some),
         Command::Grow(options) => options.run(everywhere).map(Some),
         Command::Contact(rest) => later("contact", rest),
         Command::Displace(rest) => later("displace", rest),

@@ -19,6 +19,7 @@ fn help_teaches() {
         "shape",
         "measure",
         "grow",
+        "exemplar",
     ] {
         let (code, out, _) = stereology(&[command, "--help"]);
         assert_eq!(code, 0);

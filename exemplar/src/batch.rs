@@ -190,7 +190,11 @@ impl Stage<'_> {
         let falls = [1.0, edge, edge * edge];
         let mut vote = |matched: u32, weight: f32, dr: isize, dc: isize| {
             let place = (matched as isize - dr * self.level.width as isize - dc) as u32;
-            let fall = if radius == 1 { falls[(dr * dr + dc * dc) as usize] } else { 1.0 };
+            let fall = if radius == 1 {
+                falls[(dr * dr + dc * dc) as usize]
+            } else {
+                1.0
+            };
             votes.push(place, fall * weight * multipliers[place as usize]);
         };
         for (view, (matches, weights)) in field.matches.iter().zip(&field.gaps).enumerate() {
@@ -211,9 +215,13 @@ impl Stage<'_> {
                 continue;
             }
             for dr in -reach..=reach {
-                let Some(row) = within(row, dr, n_rows, field.periodic) else { continue };
+                let Some(row) = within(row, dr, n_rows, field.periodic) else {
+                    continue;
+                };
                 for dc in -reach..=reach {
-                    let Some(column) = within(column, dc, n_columns, field.periodic) else { continue };
+                    let Some(column) = within(column, dc, n_columns, field.periodic) else {
+                        continue;
+                    };
                     let mut other = at;
                     (other[rows], other[columns]) = (row, column);
                     if field.inside.is_none() || field.holds(field.index(other)) {

@@ -105,7 +105,10 @@ impl Domain {
             }
         }
         fixed.sort_by_key(|(at, _)| *at);
-        if let Some(pair) = fixed.windows(2).find(|pair| pair[0].0 == pair[1].0 && pair[0].1 != pair[1].1) {
+        if let Some(pair) = fixed
+            .windows(2)
+            .find(|pair| pair[0].0 == pair[1].0 && pair[0].1 != pair[1].1)
+        {
             return Err(SolidError::FixedTwice {
                 at: pair[0].0,
                 first: pair[0].1.clone(),
@@ -132,9 +135,9 @@ impl Domain {
     /// Voxels inside the mask.
     #[must_use]
     pub fn voxels(&self) -> usize {
-        self.mask
-            .as_ref()
-            .map_or(self.size.iter().product(), |mask| mask.iter().filter(|inside| **inside).count())
+        self.mask.as_ref().map_or(self.size.iter().product(), |mask| {
+            mask.iter().filter(|inside| **inside).count()
+        })
     }
 
     /// The mask, if only a part of the box is made.

@@ -68,7 +68,9 @@ pub enum SolidError {
         asked: usize,
     },
     /// The solid is too small or too large.
-    #[error("a solid of {size:?} voxels (z, y, x): every side must have 2 to 4,096 voxels, and all together fewer than 2^31")]
+    #[error(
+        "a solid of {size:?} voxels (z, y, x): every side must have 2 to 4,096 voxels, and all together fewer than 2^31"
+    )]
     Size {
         /// Voxels along z, y, x.
         size: [usize; 3],

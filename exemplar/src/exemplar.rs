@@ -1,6 +1,6 @@
 //! The pictures a solid is made from.
 
-use ndarray::{Array2, ArrayView2, ArrayView3};
+use ndarray::{ArrayView2, ArrayView3};
 
 use crate::SolidError;
 

@@ -6,7 +6,7 @@ use stereology_spectrum::{autocorrelation, periodic_component};
 use crate::Exemplar;
 
 /// Neighbourhoods at the coarsest level should span so many feature sizes.
-const SPAN: f64 = 4.0;
+const SPAN: f64 = 6.0;
 
 /// Geometric mean of the lags along rows and along columns at which the autocorrelation of an exemplar's channels has fallen
 /// to 1/e, pixels.
@@ -16,7 +16,9 @@ pub(crate) fn feature_size(exemplar: &Exemplar) -> f64 {
     let planes = exemplar.planes();
     for plane in planes.chunks_exact(height * width).take(exemplar.inner_colours()) {
         let picture = Array2::from_shape_fn((height, width), |(y, x)| f64::from(plane[y * width + x]));
-        let found = periodic_component(picture.view()).ok().and_then(|p| autocorrelation(p.view()).ok());
+        let found = periodic_component(picture.view())
+            .ok()
+            .and_then(|p| autocorrelation(p.view()).ok());
         if let Some(found) = found {
             correlation += &found;
         }

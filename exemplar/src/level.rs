@@ -161,7 +161,10 @@ impl Level {
             let (tile_rows, tile_columns) = (tile(rows), tile(columns));
             for y in 0..tile_rows * phases {
                 for x in 0..tile_columns * phases {
-                    let (row, column) = (y % tile_rows * step + y / tile_rows, x % tile_columns * step + x / tile_columns);
+                    let (row, column) = (
+                        y % tile_rows * step + y / tile_rows,
+                        x % tile_columns * step + x / tile_columns,
+                    );
                     if row >= rows || column >= columns {
                         continue;
                     }
@@ -195,6 +198,8 @@ impl Level {
     /// Is the window about this place complete and of this exemplar?
     #[inline]
     pub(crate) fn fits(&self, place: usize, sheet: usize) -> bool {
-        self.owner.get(place).is_some_and(|&owner| usize::from(owner) == sheet + 1)
+        self.owner
+            .get(place)
+            .is_some_and(|&owner| usize::from(owner) == sheet + 1)
     }
 }

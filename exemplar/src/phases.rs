@@ -26,7 +26,9 @@ impl Stage<'_> {
         let mut labels: Vec<u8> = (0..field.sources.len())
             .map(|voxel| phase_of(|channel| field.values[channel][voxel], phases) as u8)
             .collect();
-        let held: Vec<u32> = (0..labels.len() as u32).filter(|&voxel| field.holds(voxel as usize)).collect();
+        let held: Vec<u32> = (0..labels.len() as u32)
+            .filter(|&voxel| field.holds(voxel as usize))
+            .collect();
         // Positive: too many.
         let mut surplus = rounded(&shares, held.len()).map(|wanted| -wanted).collect::<Vec<i64>>();
         for &voxel in &held {
@@ -86,10 +88,31 @@ fn rounded(shares: &[f64], n: usize) -> impl Iterator<Item = i64> {
     let exact: Vec<f64> = shares.iter().map(|share| share * n as f64).collect();
     let mut whole: Vec<i64> = exact.iter().map(|v| v.floor() as i64).collect();
     let mut order: Vec<usize> = (0..shares.len()).collect();
-    order.sort_by(|&a, &b| (exact[b] - exact[b].floor()).total_cmp(&(exact[a] - exact[a].floor())).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| {
+        (exact[b] - exact[b].floor())
+            .total_cmp(&(exact[a] - exact[a].floor()))
+            .then(a.cmp(&b))
+    });
     let left = n as i64 - whole.iter().sum::<i64>();
     for &phase in order.iter().cycle().take(left.max(0) as usize) {
         whole[phase] += 1;
     }
     whole.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{phase_of, rounded};
+
+    #[test]
+    fn phases_are_told_from_indicators() {
+        assert_eq!(phase_of(|_| 0.5, 2), 1);
+        assert_eq!(phase_of(|channel| [0.2, 0.5, 0.3][channel], 3), 1);
+    }
+
+    #[test]
+    fn shares_become_whole_voxels() {
+        assert_eq!(rounded(&[0.3, 0.3, 0.4], 4).collect::<Vec<_>>(), [1, 1, 2]);
+        assert_eq!(rounded(&[0.5, 0.5], 27).sum::<i64>(), 27);
+    }
 }

@@ -101,7 +101,11 @@ impl Quantiser {
                 Node::Leaf { first, last } => return &self.places[first..last.min(first + 4 * LEAF)],
                 Node::Split { left, right } => {
                     let to = |node: usize| {
-                        weighted_distance(window, &self.means[node * self.length..(node + 1) * self.length], weights)
+                        weighted_distance(
+                            window,
+                            &self.means[node * self.length..(node + 1) * self.length],
+                            weights,
+                        )
                     };
                     node = if to(right) < to(left) { right } else { left };
                 }

@@ -59,6 +59,7 @@ impl Recipe {
                 index: 0.02,
                 radii: [radius.min(2), radius.min(usize::from(!phases))],
                 edge: 0.25,
+                similar: options.similar.unwrap_or(12),
                 thinned: false,
                 ..paper
             },
@@ -85,7 +86,11 @@ impl Recipe {
         let [first, last] = self.radii;
         let left = iterations - iteration - 1;
         let late = iterations / 2;
-        if left >= late { first } else { last + (left * (first - last)).div_ceil(late) }
+        if left >= late {
+            first
+        } else {
+            last + (left * (first - last)).div_ceil(late)
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Orders in which the voxels of a box are visited.
 
-use rand::seq::SliceRandom;
 use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// An order of voxels.
@@ -116,7 +116,11 @@ fn curve(p: Step, a: Step, b: Step, c: Step, visit: &mut impl FnMut(Step)) {
     // Halves, of even length where there is a choice.
     let half = |v: Step| {
         let half = v.map(|i| i.div_euclid(2));
-        if length(half) % 2 == 1 && length(v) > 2 { plus(half, unit(v)) } else { half }
+        if length(half) % 2 == 1 && length(v) > 2 {
+            plus(half, unit(v))
+        } else {
+            half
+        }
     };
     let (a2, b2, c2) = (half(a), half(b), half(c));
     let (da, db, dc) = (unit(a), unit(b), unit(c));
@@ -183,7 +187,12 @@ mod tests {
 
     #[test]
     fn odd_boxes_are_walked_with_small_steps() {
-        let longest = |size| steps(size).into_iter().map(|step| step.into_iter().max().unwrap_or(0)).max();
+        let longest = |size| {
+            steps(size)
+                .into_iter()
+                .map(|step| step.into_iter().max().unwrap_or(0))
+                .max()
+        };
         assert_eq!(longest([7, 9, 11]), Some(1));
         assert_eq!(longest([5, 5, 5]), Some(1));
     }

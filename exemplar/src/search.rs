@@ -1,10 +1,10 @@
 //! The exemplar's neighbourhood most like one of the solid.
 
+use crate::Search;
 use crate::level::{Atlas, LANES, Level, NONE};
 use crate::quantiser::Quantiser;
 use crate::similar::Similar;
 use crate::window::Window;
-use crate::Search;
 
 /// A neighbourhood of the solid.
 pub(crate) struct Query<'a> {
@@ -36,7 +36,13 @@ impl<'a> Finder<'a> {
     pub(crate) fn new(search: Search, level: &'a Level, atlas: &Atlas, window: &'a Window, similar: usize) -> Self {
         let way = match search {
             Search::Exact => Way::Exact,
-            Search::Tsvq => Way::Tsvq(level.windows.iter().map(|places| Quantiser::new(level, places, window)).collect()),
+            Search::Tsvq => Way::Tsvq(
+                level
+                    .windows
+                    .iter()
+                    .map(|places| Quantiser::new(level, places, window))
+                    .collect(),
+            ),
             Search::KCoherence => Way::KCoherence(Similar::learn(level, atlas, window, similar)),
         };
         Self { level, window, way }
@@ -51,13 +57,16 @@ impl<'a> Finder<'a> {
             distance: f32::INFINITY,
             cost: f32::INFINITY,
         };
-        let mut consider = |place: usize, best: &mut Best| {
+        let consider = |place: usize, best: &mut Best| {
             let price = price(place);
             let bound = (best.cost - price) / query.scale;
             if bound <= 0.0 || (place == best.place && best.cost < f32::INFINITY) {
                 return;
             }
-            let distance = self.window.distance(self.level, place, query.window, query.weights, bound) * query.scale;
+            let distance = self
+                .window
+                .distance(self.level, place, query.window, query.weights, bound)
+                * query.scale;
             if distance + price < best.cost {
                 *best = Best {
                     place,
@@ -103,7 +112,11 @@ struct Best {
 #[inline]
 pub(crate) fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
     let mut sums = [0.0_f32; LANES];
-    let ((a, _), (b, _), (weights, _)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>(), weights.as_chunks::<LANES>());
+    let ((a, _), (b, _), (weights, _)) = (
+        a.as_chunks::<LANES>(),
+        b.as_chunks::<LANES>(),
+        weights.as_chunks::<LANES>(),
+    );
     for ((a, b), w) in a.iter().zip(b).zip(weights.iter().cycle()) {
         for lane in 0..LANES {
             let d = a[lane] - b[lane];

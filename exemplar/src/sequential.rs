@@ -97,7 +97,9 @@ impl Stage<'_> {
                 (other[rows], other[columns]) = (row, column);
                 let shifted =
                     field.matches[view][field.in_view(view, other)] as isize - dr * self.level.width as isize - dc;
-                let place = usize::try_from(shifted).ok().filter(|&place| self.level.fits(place, sheet));
+                let place = usize::try_from(shifted)
+                    .ok()
+                    .filter(|&place| self.level.fits(place, sheet));
                 if let Some(place) = place.filter(|place| !bases.contains(place)) {
                     bases.push(place);
                 }

@@ -140,7 +140,8 @@ impl Tree {
         let mut open: Vec<(f32, u32)> = vec![(0.0, 0)];
         let mut leaves = 0;
         while leaves < LEAVES {
-            let Some(best) = (0..open.len()).min_by(|&a, &b| open[a].0.total_cmp(&open[b].0).then(open[a].1.cmp(&open[b].1)))
+            let Some(best) =
+                (0..open.len()).min_by(|&a, &b| open[a].0.total_cmp(&open[b].0).then(open[a].1.cmp(&open[b].1)))
             else {
                 break;
             };

@@ -84,7 +84,12 @@ impl<'a> Stage<'a> {
         }
         let mut positions = Usage::new(self.level, self.atlas, &self.level.places, &uses);
         let mut colours = Colours::new(self.level, self.colours);
-        for (voxel, &source) in field.sources.iter().enumerate().filter(|(voxel, _)| field.holds(*voxel)) {
+        for (voxel, &source) in field
+            .sources
+            .iter()
+            .enumerate()
+            .filter(|(voxel, _)| field.holds(*voxel))
+        {
             positions.add(source, 1);
             for channel in 0..self.colours {
                 colours.add(channel, field.values[channel][voxel], 1);
@@ -112,7 +117,9 @@ impl<'a> Stage<'a> {
     /// What the histograms make of a vote for each place.
     pub(crate) fn multipliers(&self, tallies: &Tallies, voxels: f64) -> Vec<f32> {
         let mut made = if self.recipe.position > 0.0 {
-            tallies.positions.each(|count, target| self.overused(count, target), 1.0)
+            tallies
+                .positions
+                .each(|count, target| self.overused(count, target), 1.0)
         } else {
             vec![1.0; self.level.pixel.len()]
         };
@@ -153,7 +160,11 @@ impl<'a> Stage<'a> {
     pub(crate) fn combine(&self, votes: &Votes, made: &mut [f32]) -> u32 {
         let level = self.level;
         let plain = self.recipe.combine == Combine::Mean;
-        let total: f32 = if plain { votes.places.len() as f32 } else { votes.weights.iter().sum() };
+        let total: f32 = if plain {
+            votes.places.len() as f32
+        } else {
+            votes.weights.iter().sum()
+        };
         for (channel, made) in made.iter_mut().enumerate() {
             let theirs = &level.values[channel * level.stride..(channel + 1) * level.stride];
             let mut sum = 0.0;

@@ -7,7 +7,6 @@ use ndarray::{Array3, Array4};
 use crate::feature_size::levels_for;
 use crate::field::Field;
 use crate::level::{Atlas, Level, NONE, smoothed};
-use crate::phases::phase_of;
 use crate::recipe::{Combine, Recipe};
 use crate::stage::Stage;
 use crate::window::Window;
@@ -101,12 +100,18 @@ pub fn synthesize_solid(
     for number in (0..levels).rev() {
         let level = Level::new(exemplars, &stacks, &atlas, number, window.half, recipe.thinned);
         let mut field = field_at(domain, number, exemplars, &level);
-        match &before {
+        match before.take() {
             None => field.begin(&level, views, options.seed),
-            Some((coarse, from)) => field.refine(coarse, from, &level, &atlas, recipe.combine != Combine::Discrete),
+            Some((coarse, from)) => field.refine(&coarse, &from, &level, &atlas, recipe.combine != Combine::Discrete),
         }
-        before = None;
-        let stage = Stage::new(&level, &atlas, &window, &recipe, options.search, exemplars[0].inner_colours());
+        let stage = Stage::new(
+            &level,
+            &atlas,
+            &window,
+            &recipe,
+            options.search,
+            exemplars[0].inner_colours(),
+        );
         let mut tallies = stage.tally(&field);
         let mut energies = Vec::new();
         let share = voxels_of(number) / all / options.iterations as f64;
@@ -115,7 +120,13 @@ pub fn synthesize_solid(
             Solver::Batch => Vec::new(),
         };
         for iteration in 0..options.iterations {
-            let cancelled = |flow: ControlFlow<()>| if flow.is_break() { Err(SolidError::Cancelled) } else { Ok(()) };
+            let cancelled = |flow: ControlFlow<()>| {
+                if flow.is_break() {
+                    Err(SolidError::Cancelled)
+                } else {
+                    Ok(())
+                }
+            };
             cancelled(progress(done))?;
             let mut unchanged = false;
             match options.solver() {
@@ -154,7 +165,15 @@ pub fn synthesize_solid(
                 labels.into_iter().map(|label| phases[usize::from(label)]).collect()
             });
             drop(stage);
-            return Ok(finished(field, &level, &atlas, labels, exemplars[0].inner_colours(), reports, voxel_iterations));
+            return Ok(finished(
+                field,
+                &level,
+                &atlas,
+                labels,
+                exemplars[0].inner_colours(),
+                reports,
+                voxel_iterations,
+            ));
         }
         drop(stage);
         before = Some((field, level));
@@ -184,13 +203,22 @@ fn finished(
     });
     let sources = Array3::from_shape_fn((nz, ny, nx), |(z, y, x)| {
         let voxel = field.index([z, y, x]);
-        if field.holds(voxel) { level.pixel[field.sources[voxel] as usize] } else { NONE }
+        if field.holds(voxel) {
+            level.pixel[field.sources[voxel] as usize]
+        } else {
+            NONE
+        }
     });
     let mut uses = vec![0_u32; atlas.pixels()];
-    sources.iter().filter(|s| **s != NONE).for_each(|&s| uses[s as usize] += 1);
+    sources
+        .iter()
+        .filter(|s| **s != NONE)
+        .for_each(|&s| uses[s as usize] += 1);
     let n = field.voxels() as f64;
     let used = || uses.iter().filter(|uses| **uses > 0);
-    let entropy: f64 = used().map(|&uses| -(f64::from(uses) / n) * (f64::from(uses) / n).ln()).sum();
+    let entropy: f64 = used()
+        .map(|&uses| -(f64::from(uses) / n) * (f64::from(uses) / n).ln())
+        .sum();
     Solid {
         values,
         sources,
@@ -211,13 +239,22 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         return Err(SolidError::Neighbourhood { side });
     }
     let in_range = |option, value: usize, range: std::ops::RangeInclusive<usize>, said| {
-        if range.contains(&value) { Ok(()) } else { Err(SolidError::Option { option, range: said, asked: value }) }
+        if range.contains(&value) {
+            Ok(())
+        } else {
+            Err(SolidError::Option {
+                option,
+                range: said,
+                asked: value,
+            })
+        }
     };
     in_range("iterations", options.iterations, 1..=1000, "1 to 1000")?;
     in_range("similar pixels", options.similar.unwrap_or(1), 0..=64, "at most 64")?;
     if options.causal && options.solver() == Solver::Batch {
         return Err(SolidError::Mismatch {
-            what: "causal neighbourhoods are for the sequential solver: the batch solver has no before and after".to_owned(),
+            what: "causal neighbourhoods are for the sequential solver: the batch solver has no before and after"
+                .to_owned(),
         });
     }
     let first = &exemplars[0];
@@ -247,7 +284,9 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         });
     }
     for (at, value) in domain.fixed() {
-        let is_phase = first.phases().is_none_or(|phases| value.iter().all(|v| phases.iter().any(|&p| p as f32 == *v)));
+        let is_phase = first
+            .phases()
+            .is_none_or(|phases| value.iter().all(|v| phases.iter().any(|&p| p as f32 == *v)));
         if value.len() != first.colours() || !is_phase {
             return Err(SolidError::FixedValue {
                 at: *at,
@@ -260,12 +299,21 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
 }
 
 /// Levels to use.
-fn levels(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions, recipe: &Recipe) -> Result<usize, SolidError> {
+fn levels(
+    exemplars: &[Exemplar],
+    domain: &Domain,
+    options: &SolidOptions,
+    recipe: &Recipe,
+) -> Result<usize, SolidError> {
     let half = options.neighbourhood / 2;
     let enough = |levels: usize| {
         let step = 1_usize << (levels - 1);
         let fits = |n: usize| {
-            if recipe.thinned { n.div_ceil(step) >= 2 * half + 2 } else { n >= 2 * half * step + 2 }
+            if recipe.thinned {
+                n.div_ceil(step) >= 2 * half + 2
+            } else {
+                n >= 2 * half * step + 2
+            }
         };
         exemplars.iter().all(|e| fits(e.shape().0) && fits(e.shape().1))
             && (levels == 1 || domain.size().iter().all(|n| n.div_ceil(step) >= 2))
@@ -345,14 +393,21 @@ fn inner_value(exemplar: &Exemplar, value: &[f32]) -> Vec<f32> {
     match exemplar.phases() {
         None => value.to_vec(),
         Some([_, second]) => vec![f32::from(u8::from(value[0] == *second as f32))],
-        Some(phases) => phases.iter().map(|&phase| f32::from(u8::from(value[0] == phase as f32))).collect(),
+        Some(phases) => phases
+            .iter()
+            .map(|&phase| f32::from(u8::from(value[0] == phase as f32)))
+            .collect(),
     }
 }
 
 /// The place whose first channels are nearest to a value.
 fn nearest_place(level: &Level, value: &[f32]) -> u32 {
     let distance = |place: u32| -> f32 {
-        value.iter().enumerate().map(|(channel, v)| (v - level.value(channel, place)).powi(2)).sum()
+        value
+            .iter()
+            .enumerate()
+            .map(|(channel, v)| (v - level.value(channel, place)).powi(2))
+            .sum()
     };
     let places = level.windows.iter().flatten().copied();
     let mut best = (f32::INFINITY, 0);
@@ -363,15 +418,4 @@ fn nearest_place(level: &Level, value: &[f32]) -> u32 {
         }
     }
     best.1
-}
-
-#[cfg(test)]
-mod tests {
-    use super::phase_of;
-
-    #[test]
-    fn phases_are_told_from_indicators() {
-        assert_eq!(phase_of(|_| 0.5, 2), 1);
-        assert_eq!(phase_of(|channel| [0.2, 0.5, 0.3][channel], 3), 1);
-    }
 }

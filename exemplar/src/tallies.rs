@@ -126,7 +126,8 @@ impl Colours {
             let value = |place: usize| level.values[channel * level.stride + place];
             let low = all().map(value).fold(f32::INFINITY, f32::min);
             let high = all().map(value).fold(f32::NEG_INFINITY, f32::max);
-            made.ranges.push((low, BINS as f32 / (high - low).max(f32::MIN_POSITIVE)));
+            made.ranges
+                .push((low, BINS as f32 / (high - low).max(f32::MIN_POSITIVE)));
             for places in &level.places {
                 for &place in places {
                     let bin = made.bin(channel, value(place as usize));

@@ -68,7 +68,7 @@ pub struct Exemplar {
     /// Iterations a level
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     pub iterations: usize,
-    /// Similar pixels kept for each pixel, for k-coherence [default: 15 for chen-wang, else 4]
+    /// Similar pixels kept for each pixel, for k-coherence [default: 12 for best, 15 for chen-wang, else 4]
     #[arg(long, value_name = "K", value_parser = count)]
     pub similar: Option<usize>,
     /// What the picture's values are
@@ -206,7 +206,9 @@ impl Exemplar {
         if let Some(path) = &self.sources {
             let format = Format::from_path(path).or_usage("--sources")?;
             let shape = VolumeShape { channels: 1, ..shape };
-            write::<u32>(path, format, shape, everywhere.scale, |z, y, x, _| solid.sources[[z, y, x]])?;
+            write::<u32>(path, format, shape, everywhere.scale, |z, y, x, _| {
+                solid.sources[[z, y, x]]
+            })?;
         }
         self.tell(&mut answer, &solid, &pictures, &options, begin.elapsed().as_secs_f64());
         Ok(answer)
@@ -233,7 +235,14 @@ impl Exemplar {
             .line(format!("{} microseconds a voxel and iteration", significant(each)))
             .field("shape", vec![nz, ny, nx, channels])
             .field("method", value_name(&self.method))
-            .field("solver", if options.solver() == exemplar::Solver::Batch { "batch" } else { "sequential" })
+            .field(
+                "solver",
+                if options.solver() == exemplar::Solver::Batch {
+                    "batch"
+                } else {
+                    "sequential"
+                },
+            )
             .field("views", options.views.count())
             .field("phases", pictures.phases)
             .field("levels", levels)
@@ -246,7 +255,11 @@ impl Exemplar {
 
     fn options(&self, seed: u64) -> SolidOptions {
         let three = self.images.len() != 2;
-        let views = self.views.unwrap_or(if three { exemplar::Views::Three } else { exemplar::Views::Two });
+        let views = self.views.unwrap_or(if three {
+            exemplar::Views::Three
+        } else {
+            exemplar::Views::Two
+        });
         let mut options = SolidOptions::default()
             .with_method(match self.method {
                 Method::Best => exemplar::Method::Best,
@@ -285,7 +298,9 @@ impl Exemplar {
             .iter()
             .map(|path| read_photo(path).at(path))
             .collect::<Result<_, _>>()?;
-        let grey = photos.iter().all(|photo| photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]));
+        let grey = photos
+            .iter()
+            .all(|photo| photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]));
         let mut greys: Vec<u8> = photos.iter().flat_map(|photo| photo.pixels().map(|p| p[0])).collect();
         greys.sort_unstable();
         greys.dedup();
@@ -337,7 +352,9 @@ impl Exemplar {
 
 /// The name of an option's value.
 fn value_name(value: &impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    value
+        .to_possible_value()
+        .map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 fn write<T: Element>(
@@ -353,7 +370,11 @@ fn write<T: Element>(
                 *slot = value(z, y, x, channel);
             }
         }
-        if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     })
     .at(path)
 }

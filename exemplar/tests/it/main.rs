@@ -9,3 +9,4 @@
 mod boolean_models;
 mod comparisons;
 mod growth;
+mod synthesis;

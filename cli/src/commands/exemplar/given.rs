@@ -22,7 +22,11 @@ pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel
         .comment(Some(b'#'))
         .from_path(path)
         .at(path)?;
-    let names: &[&str] = if channels == 3 { &["x", "y", "z", "r", "g", "b"] } else { &["x", "y", "z", "value"] };
+    let names: &[&str] = if channels == 3 {
+        &["x", "y", "z", "r", "g", "b"]
+    } else {
+        &["x", "y", "z", "value"]
+    };
     let wrong = |line: u64, what: &str| {
         Failure::run(format!(
             "{}, line {line}: {what}; a row is {}, with whole numbers of voxels from 0 and values from 0 to 255",
@@ -68,7 +72,10 @@ pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel
 
 /// The mask: an array of the solid's size, or a mesh as large as fits into it, in its middle.
 pub fn mask(path: &Path, size: [usize; 3], answer: &mut Answer) -> Result<Array3<bool>, Failure> {
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy")) {
+    if path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
+    {
         let samples = read_volume(path).at(path)?.samples;
         return Ok(samples.map_axis(ndarray::Axis(3), |channels| channels.iter().any(|v| *v != 0.0)));
     }
@@ -82,14 +89,23 @@ pub fn mask(path: &Path, size: [usize; 3], answer: &mut Answer) -> Result<Array3
         .ok_or_else(|| Failure::run(format!("{}: the mesh is empty", path.display())))?;
     let sides = high - low;
     let room = [size[2], size[1], size[0]].map(|n| n as f64);
-    let scale = (0..3).map(|axis| room[axis] / sides[axis]).fold(f64::INFINITY, f64::min);
+    let scale = (0..3)
+        .map(|axis| room[axis] / sides[axis])
+        .fold(f64::INFINITY, f64::min);
     let resolution = ((sides.max() * scale + 1e-9).floor() as usize).max(1);
     let voxels = Voxels::of_mesh(&mesh, resolution).at(path)?;
     let (nz, ny, nx) = voxels.inside.dim();
     let from = [(nz, size[0]), (ny, size[1]), (nx, size[2])].map(|(n, room)| room.saturating_sub(n) / 2);
     let mut mask = Array3::from_elem(size, false);
-    let to = [(from[0] + nz).min(size[0]), (from[1] + ny).min(size[1]), (from[2] + nx).min(size[2])];
-    let kept = voxels.inside.slice(s![..to[0] - from[0], ..to[1] - from[1], ..to[2] - from[2]]);
-    mask.slice_mut(s![from[0]..to[0], from[1]..to[1], from[2]..to[2]]).assign(&kept);
+    let to = [
+        (from[0] + nz).min(size[0]),
+        (from[1] + ny).min(size[1]),
+        (from[2] + nx).min(size[2]),
+    ];
+    let kept = voxels
+        .inside
+        .slice(s![..to[0] - from[0], ..to[1] - from[1], ..to[2] - from[2]]);
+    mask.slice_mut(s![from[0]..to[0], from[1]..to[1], from[2]..to[2]])
+        .assign(&kept);
     Ok(mask)
 }

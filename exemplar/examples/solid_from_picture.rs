@@ -1,4 +1,5 @@
 //! A layered solid from one picture, and how like the picture its slices are.
+#![expect(clippy::print_stdout, reason = "an example shows its result")]
 
 use ndarray::{Array2, Axis};
 use std::ops::ControlFlow;

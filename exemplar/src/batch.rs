@@ -82,7 +82,11 @@ impl Stage<'_> {
         let full = window.count();
         let [slices, rows, columns] = VIEWS[view];
         for step in 0..area {
-            let i = if iteration % 2 == 0 { step } else { area - 1 - step };
+            let i = if iteration.is_multiple_of(2) {
+                step
+            } else {
+                area - 1 - step
+            };
             let (row, column) = (i / plane.columns, i % plane.columns);
             if field.inside.is_some() {
                 let mut at = [0; 3];
@@ -105,10 +109,9 @@ impl Stage<'_> {
                 let near_column = within(column, dc, plane.columns, field.periodic);
                 if let (Some(r), Some(c)) = (near_row, near_column) {
                     let shifted = matches[r * plane.columns + c] as isize - dr * level.width as isize - dc;
-                    if let Some(place) = usize::try_from(shifted).ok().filter(|&place| level.fits(place, sheet)) {
-                        if !bases.contains(&place) {
-                            bases.push(place);
-                        }
+                    let place = usize::try_from(shifted).ok();
+                    if let Some(place) = place.filter(|place| level.fits(*place, sheet) && !bases.contains(place)) {
+                        bases.push(place);
                     }
                 }
             }
@@ -151,7 +154,6 @@ impl Stage<'_> {
     pub(crate) fn weigh(&self, field: &mut Field) {
         for gaps in &mut field.gaps {
             let mean = gaps.iter().map(|&g| f64::from(g)).sum::<f64>() / gaps.len() as f64;
-            #[allow(clippy::cast_possible_truncation, reason = "a scale")]
             let floor = mean as f32 + 1e-9;
             gaps.par_iter_mut().for_each(|g| *g = (*g + floor).powf(R / 2.0 - 1.0));
         }

@@ -48,6 +48,7 @@ impl Exemplar {
     pub fn colour(image: ArrayView3<'_, f32>) -> Result<Self, SolidError> {
         let (height, width, colours) = image.dim();
         let planes = planes(image)?;
+        #[allow(clippy::float_cmp, reason = "the very same value everywhere is what is asked")]
         let constant = |plane: &[f32]| plane.iter().all(|v| *v == plane[0]);
         if planes.is_empty() || planes.chunks_exact(height * width).all(constant) {
             return Err(SolidError::ConstantExemplar);

@@ -43,6 +43,11 @@
 //! assert!((wasserstein(&[0.0, 1.0, 2.0], &[1.0, 2.0, 3.0]) - 1.0).abs() < 1e-6);
 //! ```
 
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "voxels and pixels are counted below 2^31, and values kept in single precision"
+)]
+
 mod batch;
 mod domain;
 mod error;

@@ -53,7 +53,6 @@ impl Projected {
             })
             .count()
             .max(1);
-        #[allow(clippy::cast_possible_truncation, reason = "components are used in single precision")]
         let components: Vec<Vec<f32>> = order[..dimensions]
             .iter()
             .map(|&i| {

@@ -114,7 +114,6 @@ impl Quantiser {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "means are used in single precision")]
 fn mean(level: &Level, window: &Window, places: &[u32]) -> Vec<f32> {
     let mut sum = vec![0.0_f64; window.len()];
     let mut buffer = vec![0.0; window.len()];

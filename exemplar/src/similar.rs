@@ -36,7 +36,7 @@ impl Similar {
                     (row, column)
                 })
                 .collect();
-            let near = (window.half + 1) / 2 * level.step;
+            let near = window.half.div_ceil(2) * level.step;
             let found: Vec<Vec<u32>> = (0..windows.len())
                 .into_par_iter()
                 .map(|i| {

@@ -137,10 +137,8 @@ impl<'a> Stage<'a> {
     /// The same for one place.
     pub(crate) fn multiplier(&self, tallies: &Tallies, voxels: f64, place: u32) -> f32 {
         let mut made = 1.0;
-        if self.recipe.position > 0.0 {
-            if let Some((count, target)) = tallies.positions.of(place) {
-                made = self.overused(count, target);
-            }
+        if let Some((count, target)) = tallies.positions.of(place).filter(|_| self.recipe.position > 0.0) {
+            made = self.overused(count, target);
         }
         if self.recipe.colour > 0.0 {
             for channel in 0..self.colours {
@@ -151,7 +149,6 @@ impl<'a> Stage<'a> {
         made
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "a factor of a weight")]
     fn overused(&self, count: f64, target: f64) -> f32 {
         (1.0 / (1.0 + f64::from(self.recipe.position) * (count / target - 1.0).max(0.0))) as f32
     }
@@ -212,7 +209,6 @@ impl<'a> Stage<'a> {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "a scale")]
 fn spread(level: &Level, window: &Window) -> f32 {
     let mut sum = 0.0;
     for channel in 0..window.channels {

@@ -235,7 +235,7 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         return Err(SolidError::Exemplars { found: exemplars.len() });
     }
     let side = options.neighbourhood;
-    if side % 2 == 0 || !(3..=15).contains(&side) {
+    if side.is_multiple_of(2) || !(3..=15).contains(&side) {
         return Err(SolidError::Neighbourhood { side });
     }
     let in_range = |option, value: usize, range: std::ops::RangeInclusive<usize>, said| {
@@ -284,10 +284,10 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         });
     }
     for (at, value) in domain.fixed() {
-        let is_phase = first
+        let fits = first
             .phases()
-            .is_none_or(|phases| value.iter().all(|v| phases.iter().any(|&p| p as f32 == *v)));
-        if value.len() != first.colours() || !is_phase {
+            .is_none_or(|phases| value.iter().all(|v| phases.iter().any(|&p| is_phase(*v, p))));
+        if value.len() != first.colours() || !fits {
             return Err(SolidError::FixedValue {
                 at: *at,
                 channels: first.colours(),
@@ -392,12 +392,19 @@ fn field_at(domain: &Domain, number: usize, exemplars: &[Exemplar], level: &Leve
 fn inner_value(exemplar: &Exemplar, value: &[f32]) -> Vec<f32> {
     match exemplar.phases() {
         None => value.to_vec(),
-        Some([_, second]) => vec![f32::from(u8::from(value[0] == *second as f32))],
+        Some([_, second]) => vec![f32::from(u8::from(is_phase(value[0], *second)))],
         Some(phases) => phases
             .iter()
-            .map(|&phase| f32::from(u8::from(value[0] == phase as f32)))
+            .map(|&phase| f32::from(u8::from(is_phase(value[0], phase))))
             .collect(),
     }
+}
+
+/// Is this value the phase's number?
+fn is_phase(value: f32, phase: u32) -> bool {
+    #[allow(clippy::float_cmp, reason = "numbers of phases are whole")]
+    let same = value == phase as f32;
+    same
 }
 
 /// The place whose first channels are nearest to a value.

@@ -91,7 +91,6 @@ impl Usage {
     }
 
     /// Raises the prices of bins that are used too often by up to two steps, lowers those of others by up to one.
-    #[allow(clippy::cast_possible_truncation, reason = "a factor of a price")]
     pub(crate) fn charge(&self, prices: &mut [f32], step: f32) {
         for ((price, &count), &target) in prices.iter_mut().zip(&self.counts).zip(&self.targets) {
             *price += step * (count as f64 / target - 1.0).clamp(-1.0, 2.0) as f32;
@@ -159,7 +158,6 @@ impl Colours {
     }
 
     /// The same of one bin.
-    #[allow(clippy::cast_possible_truncation, reason = "a factor of a weight")]
     pub(crate) fn lack_of(&self, bin: usize, voxels: f64, strength: f32) -> f32 {
         let ratio = (self.shares[bin] * voxels + 1.0) / (self.counts[bin] as f64 + 1.0);
         (ratio as f32).powf(strength).clamp(1.0 / 16.0, 16.0)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ndarray::{Array3, s};
+use ndarray::Array3;
 use stereology::exemplar::FixedVoxel;
 use stereology::exemplar::grow::Voxels;
 use stereology::grid::read_volume;
@@ -97,15 +97,10 @@ pub fn mask(path: &Path, size: [usize; 3], answer: &mut Answer) -> Result<Array3
     let (nz, ny, nx) = voxels.inside.dim();
     let from = [(nz, size[0]), (ny, size[1]), (nx, size[2])].map(|(n, room)| room.saturating_sub(n) / 2);
     let mut mask = Array3::from_elem(size, false);
-    let to = [
-        (from[0] + nz).min(size[0]),
-        (from[1] + ny).min(size[1]),
-        (from[2] + nx).min(size[2]),
-    ];
-    let kept = voxels
-        .inside
-        .slice(s![..to[0] - from[0], ..to[1] - from[1], ..to[2] - from[2]]);
-    mask.slice_mut(s![from[0]..to[0], from[1]..to[1], from[2]..to[2]])
-        .assign(&kept);
+    for ((z, y, x), &inside) in voxels.inside.indexed_iter() {
+        if let Some(slot) = mask.get_mut([from[0] + z, from[1] + y, from[2] + x]) {
+            *slot = inside;
+        }
+    }
     Ok(mask)
 }

@@ -1,4 +1,5 @@
 //! Time of a voxel and iteration.
+#![allow(missing_docs, reason = "criterion makes functions without")]
 
 use std::hint::black_box;
 use std::ops::ControlFlow;

@@ -86,6 +86,16 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing, or correct them in the tool they come from.",
     ),
     (
+        "measured-as-voxels",
+        "Measurements lie outside the mesh, but are whole numbers that fit as numbers of voxels: they were taken as that.",
+        "Say --measured-in voxels or --measured-in mesh.",
+    ),
+    (
+        "measured-moved",
+        "Measurements just outside the mesh were moved to the nearest voxel inside.",
+        "Nothing for measurements on the surface; otherwise correct their places.",
+    ),
+    (
         "mesh-repaired",
         "The mesh was not quite a closed surface and was repaired.",
         "Look at `repairs`; mend the mesh if that is not what you meant.",
@@ -104,6 +114,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "no-binder",
         "No single colour surrounds the particles: what is particle and what is binder is a guess.",
         "Give the binder's colour with --binder R,G,B, or import a label map with --labels FILE.",
+    ),
+    (
+        "no-fringes",
+        "No fringe lies wholly inside a slice or the exemplar: lengths and windings could not be measured.",
+        "Nothing for textures without fringes; otherwise larger slices, or --period if the fringes are finer.",
     ),
     (
         "no-texture",
@@ -131,9 +146,24 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Leave --paper out for densities; use it to compare with the paper's figures.",
     ),
     (
+        "range-guessed",
+        "The samples of a volume do not say which value is white; a range was taken from the data.",
+        "Give --range LOW,HIGH (or --exemplar-range) if black and white are other values.",
+    ),
+    (
+        "seeds-added",
+        "Parts of the mesh hang together with no seed by voxels; each was given one.",
+        "Nothing, or a higher --resolution, at which thin parts hang together.",
+    ),
+    (
         "self-intersection",
         "The mesh seems to cut through itself: sections show another number of profiles than its surface says.",
         "Mend the mesh (a boolean union in a mesh editor).",
+    ),
+    (
+        "slices-left-out",
+        "The volume has more slices than are measured: they were taken at even distances.",
+        "Nothing, or a larger --at-most.",
     ),
     (
         "small-labels",

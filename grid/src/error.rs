@@ -31,6 +31,20 @@ pub enum GridError {
         /// The path whose extension it was.
         path: PathBuf,
     },
+    /// The extension names no format that is read.
+    #[error("{}: volumes are read from .npy, .nrrd and .tif; convert it", path.display())]
+    UnreadableFormat {
+        /// The path whose extension it was.
+        path: PathBuf,
+    },
+    /// The file holds no volume that can be understood.
+    #[error("{}: {reason}", path.display())]
+    NotVolume {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        reason: String,
+    },
     /// One of the sizes is zero.
     #[error("a volume needs at least one voxel and one channel, not {nx} x {ny} x {nz} voxels of {channels} channels")]
     Empty {

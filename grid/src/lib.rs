@@ -17,6 +17,8 @@
 //!
 //! Voxels are cells, not points: voxel (i, j, k) covers [i, i+1] × [j, j+1] × [k, k+1] times the spacing. In VTK that is cell data, so ids are never interpolated between particles.
 //!
+//! [`read_volume`] reads `.npy`, `.nrrd` and `.tif` of any sample type, whichever program wrote them (feature `read`, on by default).
+//!
 //! # A ramp, slab by slab
 //!
 //! ```
@@ -66,7 +68,15 @@ mod frame;
 mod hdf5;
 mod npy;
 mod nrrd;
+#[cfg(feature = "read")]
+mod nrrd_reader;
+#[cfg(feature = "read")]
+mod read_volume;
+#[cfg(feature = "read")]
+mod sample_type;
 mod slabs;
+#[cfg(feature = "read")]
+mod tiff_reader;
 mod tiff_stack;
 mod vti;
 mod zarr;
@@ -76,4 +86,8 @@ pub use element::Element;
 pub use error::GridError;
 pub use format::Format;
 pub use npy::read_npy;
+#[cfg(feature = "read")]
+pub use read_volume::{StoredVolume, read_volume};
+#[cfg(feature = "read")]
+pub use sample_type::SampleType;
 pub use slabs::{VolumeShape, resume_volume, write_volume};

@@ -1,6 +1,8 @@
 //! NumPy's array file: a header of 64-byte multiples, then the samples.
 
 use crate::element::Element;
+#[cfg(feature = "read")]
+use crate::sample_type::SampleType;
 use crate::{GridError, VolumeShape};
 use ndarray::{ArrayD, IxDyn, ShapeBuilder};
 use std::fs::File;
@@ -51,24 +53,54 @@ pub(crate) fn header<T: Element>(shape: &VolumeShape) -> Vec<u8> {
 /// ```
 pub fn read_npy<T: Element>(path: impl AsRef<Path>) -> Result<ArrayD<T>, GridError> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(GridError::io(path))?;
-    let length = file.metadata().map_err(GridError::io(path))?.len();
     let wrong = |reason: String| GridError::NotNpy {
         path: path.to_owned(),
         reason,
     };
+    let (header, data) = read_bytes(path, wrong, |descr| {
+        if descr == T::NPY {
+            return Ok(size_of::<T>());
+        }
+        Err(format!(
+            "holds samples of type {descr}, not {}; convert it with numpy's astype",
+            T::NPY
+        ))
+    })?;
+    let shape = IxDyn(&header.shape).set_f(header.fortran_order);
+    ArrayD::from_shape_vec(shape, T::decode(&data)).map_err(|_| wrong("changed while it was read".into()))
+}
+
+/// Reads a `.npy` file of any numbers.
+#[cfg(feature = "read")]
+pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), GridError> {
+    let wrong = |reason: String| GridError::NotVolume {
+        path: path.to_owned(),
+        reason,
+    };
+    let kind_of = |descr: &str| {
+        SampleType::of_npy(descr)
+            .ok_or_else(|| format!("holds samples of type {descr}; convert it with numpy's astype('f4')"))
+    };
+    let (header, data) = read_bytes(path, wrong, |descr| kind_of(descr).map(|(kind, _)| kind.size()))?;
+    let (kind, big_endian) = kind_of(&header.descr).map_err(wrong)?;
+    let shape = IxDyn(&header.shape).set_f(header.fortran_order);
+    let samples = ArrayD::from_shape_vec(shape, kind.decode(&data, big_endian));
+    Ok((samples.map_err(|_| wrong("changed while it was read".into()))?, kind))
+}
+
+/// The header and the bytes behind it; `sample_size` refuses a type or tells its bytes. The header is checked against the length of the file before memory is asked for.
+fn read_bytes(
+    path: &Path,
+    wrong: impl Fn(String) -> GridError,
+    sample_size: impl Fn(&str) -> Result<usize, String>,
+) -> Result<(Header, Vec<u8>), GridError> {
+    let file = File::open(path).map_err(GridError::io(path))?;
+    let length = file.metadata().map_err(GridError::io(path))?.len();
     let mut reader = BufReader::new(file);
     let header = Header::read(&mut reader)
         .map_err(GridError::io(path))?
         .map_err(&wrong)?;
-    if header.descr != T::NPY {
-        return Err(wrong(format!(
-            "holds samples of type {}, not {}; convert it with numpy's astype",
-            header.descr,
-            T::NPY
-        )));
-    }
-    let sample = size_of::<T>() as u64;
+    let sample = sample_size(&header.descr).map_err(&wrong)? as u64;
     let bytes = header
         .shape
         .iter()
@@ -82,8 +114,7 @@ pub fn read_npy<T: Element>(path: impl AsRef<Path>) -> Result<ArrayD<T>, GridErr
     }
     let mut data = Vec::new();
     reader.read_to_end(&mut data).map_err(GridError::io(path))?;
-    let shape = IxDyn(&header.shape).set_f(header.fortran_order);
-    ArrayD::from_shape_vec(shape, T::decode(&data)).map_err(|_| wrong("changed while it was read".into()))
+    Ok((header, data))
 }
 
 struct Header {

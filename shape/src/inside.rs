@@ -2,8 +2,41 @@
 
 use nalgebra::Point3;
 
+use crate::closed_mesh::ClosedMesh;
 use crate::triangle_mesh::{TriangleMesh, index};
 use crate::winding::ray_crossing;
+
+/// Inside or outside a closed mesh in its own place and size, exactly and in about a microsecond: what voxels are made with. Preparing costs about a microsecond a triangle.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use stereology_shape::{ClosedMesh, InsideTest, TriangleMesh};
+///
+/// let ball = InsideTest::new(&ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3))?);
+/// assert!(ball.contains(&Point3::new(0.0, 0.0, 0.9)));
+/// assert!(!ball.contains(&Point3::new(0.0, 0.8, 0.8)));
+/// # Ok::<(), stereology_shape::MeshError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct InsideTest {
+    columns: Columns,
+}
+
+impl InsideTest {
+    /// Sorts the mesh's triangles into columns.
+    #[must_use]
+    pub fn new(mesh: &ClosedMesh) -> Self {
+        Self {
+            columns: Columns::new(mesh.as_triangle_mesh()),
+        }
+    }
+
+    /// Whether a point is inside; points of the surface itself are outside.
+    #[must_use]
+    pub fn contains(&self, p: &Point3<f64>) -> bool {
+        self.columns.contains(p)
+    }
+}
 
 /// Triangles by the cells of a grid in (y, z) that their projections touch: a ray along x meets those of one cell only.
 #[derive(Clone, Debug)]

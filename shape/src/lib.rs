@@ -95,6 +95,7 @@ pub use coloured_mesh_file::write_coloured_mesh;
 pub use control_sphere::{ControlSphere, ControlSphereError};
 pub use corner_normals::corner_normals;
 pub use hull::{HullError, convex_hull};
+pub use inside::InsideTest;
 #[cfg(feature = "io")]
 pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};
 pub use particle::{Particle, isotropic_rotation};

@@ -16,6 +16,7 @@
 //! | [`pyramid`] | What texture looks like this one? |
 //! | [`volume`] | Which colour is at this point of the solid? |
 //! | [`render`] | What does it look like? |
+//! | [`exemplar`] | Which solid has slices like this picture, and how like are they? |
 //!
 //! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.
 //!
@@ -48,6 +49,8 @@ pub mod sample;
 
 #[cfg(feature = "anneal")]
 pub use stereology_anneal as anneal;
+#[cfg(feature = "exemplar")]
+pub use stereology_exemplar as exemplar;
 #[cfg(feature = "grid")]
 pub use stereology_grid as grid;
 #[cfg(feature = "kmatrix")]

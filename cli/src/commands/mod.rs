@@ -1,8 +1,11 @@
 //! The commands, one module each.
 
 pub mod carve;
+pub mod exemplar;
 pub mod export;
+pub mod grow;
 pub mod kmatrix;
+pub mod measure;
 pub mod pack;
 mod pack_quality;
 pub mod pyramid;
@@ -51,12 +54,9 @@ pub enum Command {
     Render(render::Render),
     Export(export::Export),
     Carve(carve::Carve),
-    /// Not available yet: measures of a finished solid
-    Measure(Later),
-    /// Not available yet: a solid from one picture without particles
-    Exemplar(Later),
-    /// Not available yet: stone grown around measured particles
-    Grow(Later),
+    Measure(measure::Measure),
+    Exemplar(exemplar::Exemplar),
+    Grow(grow::Grow),
     /// Not available yet: contact distributions of a microgeometry
     Contact(Later),
     /// Not available yet: stochastic displacement of a mesh
@@ -95,9 +95,9 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Render(options) => options.run(everywhere).map(Some),
         Command::Export(options) => options.run(everywhere).map(Some),
         Command::Carve(options) => options.run(everywhere).map(Some),
-        Command::Measure(rest) => later("measure", rest),
-        Command::Exemplar(rest) => later("exemplar", rest),
-        Command::Grow(rest) => later("grow", rest),
+        Command::Measure(options) => options.run(everywhere).map(Some),
+        Command::Exemplar(options) => options.run(everywhere).map(Some),
+        Command::Grow(options) => options.run(everywhere).map(Some),
         Command::Contact(rest) => later("contact", rest),
         Command::Displace(rest) => later("displace", rest),
         Command::Explore(rest) => later("explore", rest),

@@ -2,12 +2,14 @@
 //!
 //! One file without scripts or links: pictures and plots are inside. It holds nothing that differs between two runs with the same inputs and seed.
 
+mod measures;
 mod of_synthesis;
 mod page;
 mod pictures;
 mod plots;
 mod trust;
 
+pub use measures::{MeasureReport, measures_page};
 pub use of_synthesis::{Pictures, report_input};
 pub use page::page;
 pub use trust::{Grade, Verdict, verdict};

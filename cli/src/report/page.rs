@@ -358,7 +358,7 @@ fn with_interval(value: f64, interval: Option<(f64, f64)>) -> String {
 }
 
 /// Rows of a name and a value; values are HTML.
-fn table(html: &mut String, rows: &[(String, String)]) {
+pub(super) fn table(html: &mut String, rows: &[(String, String)]) {
     html.push_str("<table>\n");
     for (name, value) in rows {
         let _ = writeln!(
@@ -371,7 +371,7 @@ fn table(html: &mut String, rows: &[(String, String)]) {
 }
 
 /// A picture as wide, relative to its neighbours, as it has pixels.
-fn figure_to_scale(html: &mut String, picture: &RgbImage, caption: &str) {
+pub(super) fn figure_to_scale(html: &mut String, picture: &RgbImage, caption: &str) {
     let _ = writeln!(
         html,
         "<figure style=\"flex-grow: {}\"><img alt=\"{caption}\" src=\"{}\"><figcaption>{caption}</figcaption></figure>",
@@ -401,7 +401,7 @@ fn sentence(text: &str) -> String {
     sentence
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -130,6 +130,59 @@ pub(super) fn spectra(spectrum: &Spectrum) -> String {
     )
 }
 
+const BESIDE: [(RGBColor, &str); 2] = [(INK, "exemplar"), (FIT, "volume")];
+
+/// Curves of exemplar and volume over the same places.
+pub(super) fn pair(places: &[f64], values: &[Vec<f64>; 2], x_name: &str, y_name: &str) -> String {
+    let points = [0, 1].map(|k| {
+        places
+            .iter()
+            .copied()
+            .zip(values[k].iter().copied())
+            .collect::<Vec<_>>()
+    });
+    beside(points, x_name, y_name)
+}
+
+/// Shares of values up to each, of two sorted lists.
+pub(super) fn distribution(values: &[Vec<f64>; 2], x_name: &str) -> String {
+    let points = [0, 1].map(|k| {
+        let n = values[k].len() as f64;
+        let shares = (0..values[k].len()).map(|i| (i + 1) as f64 / n);
+        values[k].iter().copied().zip(shares).collect::<Vec<_>>()
+    });
+    beside(points, x_name, "share")
+}
+
+/// A value of every slice of the volume; the exemplar's mean is a line across.
+pub(super) fn slices(values: &[Vec<f64>; 2], x_name: &str, y_name: &str) -> String {
+    let n = values[1].len().max(1) as f64;
+    let mean = values[0].iter().sum::<f64>() / values[0].len().max(1) as f64;
+    let of_volume = values[1]
+        .iter()
+        .enumerate()
+        .map(|(i, v)| ((i as f64 + 0.5) / n, *v))
+        .collect();
+    beside([vec![(0.0, mean), (1.0, mean)], of_volume], x_name, y_name)
+}
+
+fn beside(points: [Vec<(f64, f64)>; 2], x_name: &str, y_name: &str) -> String {
+    drawn(&BESIDE, |area| {
+        let all = || points.iter().flatten().copied();
+        let (left, right) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
+        if left >= right {
+            return Err("there is nothing to show".into());
+        }
+        let lowest = all().map(|p| p.1).fold(0.0, f64::min);
+        let top = highest(all().map(|p| p.1));
+        let mut chart = axes(area, left..right, 1.08 * lowest..top, x_name, y_name)?;
+        for (points, (colour, _)) in points.iter().zip(BESIDE) {
+            chart.draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?;
+        }
+        Ok(())
+    })
+}
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// The key of a plot and its SVG, scaled by the page; a plot that cannot be drawn says so.

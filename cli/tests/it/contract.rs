@@ -17,6 +17,9 @@ fn help_teaches() {
         "export",
         "carve",
         "shape",
+        "measure",
+        "grow",
+        "exemplar",
     ] {
         let (code, out, _) = stereology(&[command, "--help"]);
         assert_eq!(code, 0);
@@ -44,14 +47,7 @@ fn wrong_usage_exits_2() {
 
 #[test]
 fn what_is_not_built_says_so() {
-    for later in [
-        &["measure", "--anything", "3"] as &[_],
-        &["exemplar", "a.png", "--size", "64"],
-        &["grow"],
-        &["contact", "a.png", "--json"],
-        &["displace"],
-        &["explore"],
-    ] {
+    for later in [&["contact", "a.png", "--json"] as &[_], &["displace"], &["explore"]] {
         let (code, _, error) = stereology(later);
         assert_eq!(code, 2, "{later:?}: {error}");
         assert!(error.contains("not available yet"), "{later:?}: {error}");

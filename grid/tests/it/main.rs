@@ -3,5 +3,7 @@
 
 mod damaged;
 mod formats;
+#[cfg(feature = "read")]
+mod other_programs;
 mod resume;
 mod whole_or_nothing;

@@ -1,0 +1,408 @@
+//! `stereology grow`: stone grown around measurements inside a mesh.
+
+mod measurements;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use ndarray::{Array3, Array4, ArrayView3, Axis};
+use stereology::exemplar::grow::{
+    self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels,
+};
+use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
+use stereology::segment::read_photo;
+use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
+
+use self::measurements::Unit;
+use crate::answer::Answer;
+use crate::arguments::Everywhere;
+use crate::failure::{Explain, Failure, body};
+use crate::numbers::{counted, significant};
+use crate::outputs::{check_file, write_png};
+use crate::progress::{Step, go_on, stopped};
+use crate::values::count;
+use crate::warnings::Warning;
+
+/// Fills a mesh with stone that looks like a picture and agrees with measurements
+///
+/// Voxels whose centres lie inside MESH are filled outwards from seeds, the nearest first: each looks at the window about it in a random plane and copies the middle of a window of IMAGE that looks like what is
+/// there already (Stone et al. 2014). Measured voxels keep their values; connected ones are one seed. The rest of the box is 0.
+///
+/// MESH is a closed mesh (.obj, .stl, .ply), sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L or rock:SEED; or picture:H,W, which grows a picture (-o FILE.png) by Efros and Leung's method. IMAGE is a picture, or a .npy, .nrrd or
+/// .tif of any number of channels (grey and chemistry); the result has its channels and, if it holds bytes, is u8, else f32.
+#[derive(Args, Debug)]
+#[command(
+    after_long_help = "Example: stereology grow statue.obj soapstone.png --resolution 96 --measured drilled.csv -o statue.npy"
+)]
+pub struct Grow {
+    /// Closed mesh, SHAPE, or picture:H,W
+    pub mesh: String,
+    /// What the stone looks like in a cut
+    pub image: PathBuf,
+    /// Voxels along the mesh's longest side
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub resolution: Option<usize>,
+    /// Measurements: rows of x, y, z and a value for each channel of IMAGE, as stored there (0 to 255 of a picture)
+    #[arg(long, value_name = "CSV")]
+    pub measured: Option<PathBuf>,
+    /// What x, y, z of the measurements are
+    #[arg(long, value_enum, default_value_t = Unit::Auto)]
+    pub measured_in: Unit,
+    /// Random seeds besides the measurements [default: 12 without measurements, else none]
+    #[arg(long, value_name = "K", value_parser = seeds)]
+    pub seeds: Option<usize>,
+    /// Side of the window, pixels: odd, 3 to 15; 0 takes colours of the histogram, without texture
+    #[arg(long, value_name = "PIXELS", default_value_t = 5)]
+    pub window: usize,
+    /// Planes in which windows lie
+    #[arg(long, value_enum, default_value_t = Planes::Axis)]
+    pub planes: Planes,
+    /// How windows are looked for
+    #[arg(long, value_enum, default_value_t = Way::Tree)]
+    pub search: Way,
+    /// For picture:H,W: that many levels from coarse to fine, row by row (Wei and Levoy), instead of growing
+    #[arg(long, value_name = "L", value_parser = count)]
+    pub levels: Option<usize>,
+    /// Also the cell of each voxel, u32 from 1; 0 is outside the mesh
+    #[arg(long, value_name = "FILE")]
+    pub cells: Option<PathBuf>,
+    /// Also the texel of IMAGE each voxel was copied from, u32, row x width + column; 4294967295 where it was not copied
+    #[arg(long, value_name = "FILE")]
+    pub sources: Option<PathBuf>,
+    /// File for the stone: .npy, .nrrd, .vti, .tif (.png of a picture)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+/// Planes in which windows lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Planes {
+    /// The three planes of the axes
+    Axis,
+    /// Those and ten diagonal ones
+    Oblique,
+}
+
+/// How windows are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Way {
+    /// Some 400 windows by a tree, and those that continue the neighbours' own
+    Tree,
+    /// Every window of IMAGE
+    Exact,
+}
+
+/// What the stone looks like, values as stored.
+struct Image {
+    samples: Array3<f32>,
+    is_bytes: bool,
+}
+
+/// 0 to a million.
+fn seeds(text: &str) -> Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(number @ 0..=1_000_000) => Ok(number),
+        _ => Err("a whole number from 0 to 1000000 is needed".to_owned()),
+    }
+}
+
+impl Grow {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        if let Some(size) = self.mesh.strip_prefix("picture:") {
+            return self.picture(size, everywhere);
+        }
+        let format = Format::from_path(&self.output).or_usage("-o")?;
+        let further = [("--cells", &self.cells), ("--sources", &self.sources)];
+        check_file(&self.output, everywhere.force)?;
+        for (option, path) in further {
+            if let Some(path) = path {
+                Format::from_path(path).or_usage(option)?;
+                check_file(path, everywhere.force)?;
+            }
+        }
+        let resolution = self
+            .resolution
+            .ok_or_else(|| Failure::usage("--resolution N is needed: voxels along the mesh's longest side"))?;
+        if self.levels.is_some() {
+            return Err(Failure::usage("--levels is for picture:H,W"));
+        }
+        let begin = Instant::now();
+        let mut answer = Answer::new("grow");
+        let image = self.image()?;
+        let mesh = closed_mesh(&self.mesh)?;
+        for repair in mesh.repairs() {
+            answer.warn(Warning::new("mesh-repaired", repair.to_string()));
+        }
+        let voxels = Voxels::of_mesh(&mesh, resolution).at(Path::new(&self.mesh))?;
+        let channels = image.samples.dim().2;
+        let measured = match &self.measured {
+            None => Vec::new(),
+            Some(path) => {
+                let found = measurements::read(path, self.measured_in, &voxels, channels, image.is_bytes)?;
+                found.warnings.into_iter().for_each(|warning| {
+                    answer.warn(warning);
+                });
+                found.voxels
+            }
+        };
+        let options = self.options(everywhere.seed, if measured.is_empty() { 12 } else { 0 });
+        let step = Step::begin("grow", everywhere.quiet);
+        let grown = grow::grow(
+            voxels.inside.view(),
+            image.samples.view(),
+            &measured,
+            &options,
+            &|done| step.at(done),
+        )
+        .map_err(|error| self.explained(&error))?;
+        drop(step);
+        go_on()?;
+        let spacing = [voxels.spacing; 3];
+        if image.is_bytes {
+            write(&self.output, format, spacing, &grown.values.mapv(|v| v as u8))?;
+        } else {
+            write(&self.output, format, spacing, &grown.values)?;
+        }
+        for (path, numbers) in [(&self.cells, &grown.labels), (&self.sources, &grown.sources)] {
+            if let Some(path) = path {
+                let format = Format::from_path(path).or_usage("FILE")?;
+                write(path, format, spacing, &numbers.clone().insert_axis(Axis(3)))?;
+            }
+        }
+        self.tell(&mut answer, &grown, &voxels, begin.elapsed().as_secs_f64());
+        Ok(answer)
+    }
+
+    fn tell(&self, answer: &mut Answer, grown: &Grown, voxels: &Voxels, seconds: f64) {
+        let (nz, ny, nx, channels) = grown.values.dim();
+        if grown.added_seeds > 0 {
+            answer.warn(Warning::new(
+                "seeds-added",
+                format!("{} parts of the mesh had no seed", grown.added_seeds),
+            ));
+        }
+        answer
+            .line(format!(
+                "{} of {} voxels inside filled, {nx} x {ny} x {nz} of {} mesh units: {}",
+                counted(grown.filled as u64),
+                counted(grown.inside as u64),
+                significant(voxels.spacing),
+                self.output.display()
+            ))
+            .line(format!(
+                "{} cells; {} measured voxels, {} of them changed",
+                grown.cells, grown.measured, grown.fixed_changed
+            ))
+            .line(format!(
+                "{} microseconds a voxel",
+                significant(1e6 * seconds / grown.filled.max(1) as f64)
+            ))
+            .field("voxels_inside", grown.inside)
+            .field("filled", grown.filled)
+            .field("fixed_changed", grown.fixed_changed)
+            .field("cells", grown.cells)
+            .field("measured", grown.measured)
+            .field("added_seeds", grown.added_seeds)
+            .field("by_histogram", grown.by_histogram)
+            .field("mean_distance", grown.mean_distance)
+            .field("window", self.window)
+            .field("shape", vec![nz, ny, nx, channels])
+            .field("spacing", voxels.spacing)
+            .field("origin", vec![voxels.origin.x, voxels.origin.y, voxels.origin.z])
+            .field("microseconds_per_voxel", 1e6 * seconds / grown.filled.max(1) as f64)
+            .seconds(seconds);
+    }
+
+    fn options(&self, seed: u64, seeds: usize) -> GrowOptions {
+        GrowOptions::default()
+            .with_window(self.window)
+            .with_seeds(self.seeds.unwrap_or(seeds))
+            .with_planes(match self.planes {
+                Planes::Axis => grow::Planes::Axis,
+                Planes::Oblique => grow::Planes::Oblique,
+            })
+            .with_search(match self.search {
+                Way::Tree => Search::default(),
+                Way::Exact => Search::Exact,
+            })
+            .with_seed(seed)
+    }
+
+    /// An error of growing: a window that cannot be is wrong usage, everything else is about a file.
+    fn explained(&self, error: &grow::GrowError) -> Failure {
+        use grow::GrowError as E;
+        match error {
+            E::Window { .. } => Failure::usage(format!("--window: {error}")),
+            E::NoSeeds => Failure::usage("nothing to grow from: give --measured CSV, or --seeds K above 0"),
+            E::Levels { .. } => Failure::usage(format!("--levels: {error}")),
+            E::OutsideMask { .. } | E::Contradicting { .. } | E::Value { .. } => match &self.measured {
+                Some(path) => Failure::run(format!("{}: {error}", path.display())),
+                None => Failure::run(error),
+            },
+            E::EmptyMask => Failure::run(format!("{}: {error}", self.mesh)),
+            _ => Failure::run(format!("{}: {error}", self.image.display())),
+        }
+    }
+
+    fn picture(&self, size: &str, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let sides: Option<Vec<usize>> = size.split(',').map(|n| n.trim().parse().ok()).collect();
+        let [height, width] = match sides.as_deref() {
+            Some(&[height @ 1..=16_384, width @ 1..=16_384]) => [height, width],
+            _ => {
+                return Err(Failure::usage(
+                    "picture:H,W needs two whole numbers of pixels, such as picture:256,256",
+                ));
+            }
+        };
+        let is_png = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        let only_solids = [
+            self.measured.is_some(),
+            self.resolution.is_some(),
+            self.cells.is_some(),
+            self.sources.is_some(),
+        ];
+        if !is_png || only_solids.contains(&true) {
+            return Err(Failure::usage(
+                "picture:H,W is written to -o FILE.png, and takes no --resolution, --measured, --cells or --sources",
+            ));
+        }
+        check_file(&self.output, everywhere.force)?;
+        let image = self.image()?;
+        let channels = image.samples.dim().2;
+        if !image.is_bytes || !(channels == 1 || channels == 3) {
+            return Err(Failure::run(format!(
+                "{}: a picture is grown from a grey or RGB picture of bytes",
+                self.image.display()
+            )));
+        }
+        let begin = Instant::now();
+        let step = Step::begin("grow", everywhere.quiet);
+        let progress = |done: f64| step.at(done);
+        let made = match self.levels {
+            None => grow_picture(
+                image.samples.view(),
+                [height, width],
+                &self.options(everywhere.seed, 1),
+                &progress,
+            ),
+            Some(levels) => {
+                let options = LevelOptions {
+                    search: self.options(0, 0).search,
+                    ..LevelOptions::default()
+                        .with_levels(levels)
+                        .with_window(self.window)
+                        .with_seed(everywhere.seed)
+                };
+                synthesize_by_levels(image.samples.view(), [height, width], &options, &progress)
+            }
+        }
+        .map_err(|error| self.explained(&error))?;
+        drop(step);
+        go_on()?;
+        write_png(&self.output, &as_picture(&made.view()))?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let mut answer = Answer::new("grow");
+        answer
+            .line(format!("{width} x {height} pixels: {}", self.output.display()))
+            .field("voxels_inside", height * width)
+            .field("filled", height * width)
+            .field("fixed_changed", 0)
+            .field("cells", 1)
+            .field("window", self.window)
+            .field("shape", vec![height, width, channels])
+            .field("microseconds_per_voxel", 1e6 * seconds / (height * width) as f64)
+            .seconds(seconds);
+        Ok(answer)
+    }
+
+    fn image(&self) -> Result<Image, Failure> {
+        let path = &self.image;
+        let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let stored = match ending.as_deref() {
+            Some("npy" | "nrrd" | "nhdr") => read_volume(path).at(path)?,
+            // A TIFF that is not of bytes or colours may hold chemistry; a photograph comes in more ways.
+            Some("tif" | "tiff") => match read_volume(path) {
+                Ok(stored) if stored.samples.dim().3 != 4 => stored,
+                _ => return of_photo(path),
+            },
+            _ => return of_photo(path),
+        };
+        let (slices, ..) = stored.samples.dim();
+        if slices != 1 {
+            return Err(Failure::run(format!(
+                "{}: holds {slices} slices; give one picture, axes (y, x) or (y, x, 3), or (1, y, x, channel)",
+                path.display()
+            )));
+        }
+        Ok(Image {
+            samples: stored.samples.index_axis_move(Axis(0), 0),
+            is_bytes: stored.sample_type == SampleType::U8,
+        })
+    }
+}
+
+/// A photograph's bytes; grey if it shows nothing else.
+fn of_photo(path: &Path) -> Result<Image, Failure> {
+    let photo = read_photo(path).at(path)?;
+    let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
+    let shape = (
+        photo.height() as usize,
+        photo.width() as usize,
+        if is_grey { 1 } else { 3 },
+    );
+    Ok(Image {
+        samples: Array3::from_shape_fn(shape, |(y, x, c)| f32::from(photo.get_pixel(x as u32, y as u32)[c])),
+        is_bytes: true,
+    })
+}
+
+fn as_picture(made: &ArrayView3<'_, f32>) -> image::RgbImage {
+    let (height, width, channels) = made.dim();
+    image::RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        image::Rgb([0, 1, 2].map(|c| made[[y as usize, x as usize, if channels == 3 { c } else { 0 }]] as u8))
+    })
+}
+
+/// The mesh of a file or a SHAPE; balls as many triangles.
+pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
+    let path = Path::new(spec);
+    let is_file = path
+        .extension()
+        .is_some_and(|e| ["obj", "stl", "ply"].iter().any(|known| e.eq_ignore_ascii_case(known)));
+    if is_file {
+        return ClosedMesh::try_from(read_mesh(path).at(path)?).at(path);
+    }
+    let numbers = |prefix: &str| -> Option<Vec<f64>> {
+        spec.strip_prefix(prefix)?
+            .split(',')
+            .map(|n| n.trim().parse().ok())
+            .collect()
+    };
+    // Checks the numbers, and knows every other shape.
+    let body: Body = body(spec)?;
+    if let Some(mesh) = body.mesh() {
+        return Ok(mesh.clone());
+    }
+    let axes = match numbers("ellipsoid:").as_deref() {
+        Some(&[a, b, c]) => [a, b, c],
+        _ => [0.5; 3],
+    };
+    let ball = TriangleMesh::icosphere(2.0, 5);
+    ClosedMesh::try_from(ball.mapped(|p| nalgebra::Point3::new(axes[0] * p.x, axes[1] * p.y, axes[2] * p.z))).or_fail()
+}
+
+fn write<T: Element>(path: &Path, format: Format, spacing: [f64; 3], samples: &Array4<T>) -> Result<(), Failure> {
+    let (nz, ny, nx, channels) = samples.dim();
+    let shape = VolumeShape { nz, ny, nx, channels };
+    write_volume::<T>(path, format, shape, spacing, |z, mut slab| {
+        slab.assign(&samples.index_axis(Axis(0), z));
+        if stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .at(path)
+}

@@ -1,0 +1,30 @@
+//! A layered solid from one picture, and how like the picture its slices are.
+#![expect(clippy::print_stdout, reason = "an example shows its result")]
+
+use ndarray::{Array2, Axis};
+use std::ops::ControlFlow;
+use stereology_exemplar::measure::{Family, MeasureOptions, compare, sections};
+use stereology_exemplar::{Domain, Exemplar, SolidOptions, Views, synthesize_solid};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let layers = Array2::from_shape_fn((64, 64), |(z, x)| {
+        0.5 + 0.4 * (0.9 * z as f32 + 1.5 * (0.11 * x as f32).sin()).sin()
+    });
+    let exemplar = Exemplar::grey(layers.view())?;
+    let options = SolidOptions::default().with_views(Views::Two);
+    let solid = synthesize_solid(&[exemplar], &Domain::new([32; 3])?, &options, &|_| {
+        ControlFlow::Continue(())
+    })?;
+    let picture = layers.insert_axis(Axis(2));
+    let slices = sections(solid.values.view(), Family::Xz);
+    let found = compare(&[picture.view()], &slices, &MeasureOptions::default(), &|_| {
+        ControlFlow::Continue(())
+    })?;
+    for (name, figure) in found.figures() {
+        if let Some(value) = figure.value {
+            println!("{name}: {value:.4}");
+        }
+    }
+    println!("{:.0} % of the picture's pixels are used", 100.0 * solid.coverage);
+    Ok(())
+}

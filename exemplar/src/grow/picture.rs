@@ -1,0 +1,82 @@
+//! Efros and Leung's synthesis of pictures: grown outwards from a piece of the exemplar.
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "texels, voxels and cells are fewer than 2^32: `grow` refuses more"
+)]
+
+use super::growth::{Work, check_exemplar};
+use super::planes::picture_layout;
+use super::{GrowError, GrowOptions, flood_fill};
+use ndarray::{Array3, ArrayView3, Axis};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::ops::ControlFlow;
+
+/// A picture of `height` × `width` pixels grown from the middle outwards, from a random 3 × 3 piece of the exemplar (row, column, channel); windows are neither turned nor mirrored.
+///
+/// # Errors
+///
+/// [`GrowError`]; [`GrowError::EmptyMask`] for a picture without pixels.
+///
+/// # References
+///
+/// Efros & Leung 1999; Stone et al. 2014, section 3 and figure 2.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array3;
+/// use std::ops::ControlFlow;
+/// use stereology_exemplar::grow::{GrowOptions, grow_picture};
+///
+/// let stripes = Array3::from_shape_fn((20, 20, 1), |(y, _, _)| (y / 2 % 2) as f32);
+/// let grown = grow_picture(stripes.view(), [30, 40], &GrowOptions::default().with_window(7), &|_| ControlFlow::Continue(()))?;
+/// assert!((0..30).all(|y| (1..40).all(|x| grown[[y, x, 0]] == grown[[y, 0, 0]])));
+/// # Ok::<(), stereology_exemplar::grow::GrowError>(())
+/// ```
+pub fn grow_picture(
+    exemplar: ArrayView3<'_, f32>,
+    [height, width]: [usize; 2],
+    options: &GrowOptions,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> Result<Array3<f32>, GrowError> {
+    let reach = check_exemplar(exemplar, options.window)?;
+    if height == 0 || width == 0 {
+        return Err(GrowError::EmptyMask);
+    }
+    let (rows, columns, _) = exemplar.dim();
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    rng.set_stream(1);
+    // A piece as large as fits, 3 x 3 at most, about a place of the exemplar where it is whole.
+    let piece = [height.min(rows).min(3), width.min(columns).min(3)];
+    let from = [
+        rng.random_range(0..=rows - piece[0]),
+        rng.random_range(0..=columns - piece[1]),
+    ];
+    let to = [(height - piece[0]) / 2, (width - piece[1]) / 2];
+    let cells = || (0..piece[0]).flat_map(|y| (0..piece[1]).map(move |x| (y, x)));
+    let seeds: Vec<([usize; 3], u32)> = cells().map(|(y, x)| ([0, to[0] + y, to[1] + x], 1)).collect();
+    let pixels: Vec<(Vec<f32>, u32)> = cells()
+        .map(|(y, x)| {
+            let (y, x) = (from[0] + y, from[1] + x);
+            let value = exemplar.index_axis(Axis(0), y).index_axis(Axis(0), x).to_vec();
+            (value, (y * columns + x) as u32)
+        })
+        .collect();
+    let given: Vec<(&[f32], u32)> = pixels.iter().map(|(value, texel)| (value.as_slice(), *texel)).collect();
+    let mask = Array3::from_elem((1, height, width), true);
+    let fill = flood_fill(mask.view(), &seeds);
+    let work = Work {
+        exemplar,
+        reach,
+        layouts: if options.window == 0 {
+            Vec::new()
+        } else {
+            picture_layout(reach)
+        },
+        options,
+        progress,
+    };
+    let filled = work.fill(&fill.order, &given, mask.dim())?;
+    Ok(filled.values.index_axis_move(Axis(0), 0))
+}

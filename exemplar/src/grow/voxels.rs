@@ -1,0 +1,179 @@
+//! A closed mesh as voxels.
+
+use super::GrowError;
+use nalgebra::{Point3, Vector3};
+use ndarray::{Array3, ArrayView3};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use stereology_shape::{ClosedMesh, InsideTest};
+
+/// The voxels whose centres lie inside a mesh, and where they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Voxels {
+    /// Whether a voxel (z, y, x) is inside.
+    pub inside: Array3<bool>,
+    /// Lowest corner of the first voxel, in the mesh's unit.
+    pub origin: Point3<f64>,
+    /// Side of a voxel, in the mesh's unit.
+    pub spacing: f64,
+}
+
+impl Voxels {
+    /// `resolution` voxels along the longest side of the mesh's box; the shorter sides get as many whole voxels as hold them, centred. Exact for every centre; points on the surface are outside.
+    /// Cost: about a microsecond a voxel of the box and core.
+    ///
+    /// # Errors
+    ///
+    /// [`GrowError::Resolution`], [`GrowError::EmptyMask`].
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_exemplar::grow::Voxels;
+    /// use stereology_shape::{ClosedMesh, TriangleMesh};
+    ///
+    /// let brick = ClosedMesh::try_from(TriangleMesh::cuboid([4.0, 2.0, 1.0]))?;
+    /// let voxels = Voxels::of_mesh(&brick, 8)?;
+    /// assert_eq!(voxels.inside.dim(), (2, 4, 8));
+    /// assert!(voxels.inside.iter().all(|inside| *inside));
+    /// assert_eq!(voxels.voxel_at(&nalgebra::Point3::new(-1.9, -0.9, 0.4)), Some([1, 0, 0]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most the resolution"
+    )]
+    pub fn of_mesh(mesh: &ClosedMesh, resolution: usize) -> Result<Self, GrowError> {
+        if !(1..=2048).contains(&resolution) {
+            return Err(GrowError::Resolution { resolution });
+        }
+        let (low, high) = mesh.as_triangle_mesh().bounding_box().ok_or(GrowError::EmptyMask)?;
+        let sides = high - low;
+        let spacing = sides.max() / resolution as f64;
+        // Rounding must not add a voxel to a side that is a whole number of them.
+        let counts = sides.map(|side| (side / spacing - 1e-9).ceil().clamp(1.0, resolution as f64));
+        let origin = nalgebra::center(&low, &high) - counts * (spacing / 2.0);
+        let [nx, ny, nz] = [counts.x as usize, counts.y as usize, counts.z as usize];
+        let test = InsideTest::new(mesh);
+        let rows: Vec<Vec<bool>> = (0..nz * ny)
+            .into_par_iter()
+            .map(|row| {
+                let centre = |x: usize| {
+                    let place = Vector3::new(x as f64, (row % ny) as f64, (row / ny) as f64);
+                    origin + place.add_scalar(0.5) * spacing
+                };
+                (0..nx).map(|x| test.contains(&centre(x))).collect()
+            })
+            .collect();
+        let inside = Array3::from_shape_vec((nz, ny, nx), rows.concat()).map_err(|_| GrowError::EmptyMask)?;
+        if !inside.iter().any(|&here| here) {
+            return Err(GrowError::EmptyMask);
+        }
+        Ok(Self {
+            inside,
+            origin,
+            spacing,
+        })
+    }
+
+    /// The voxel (z, y, x) that holds a point, inside or not; `None` beyond the box.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked against the box"
+    )]
+    pub fn voxel_at(&self, point: &Point3<f64>) -> Option<[usize; 3]> {
+        let place = (point - self.origin) / self.spacing;
+        let (nz, ny, nx) = self.inside.dim();
+        let index = |place: f64, n: usize| (place >= 0.0 && place < n as f64).then_some(place as usize);
+        Some([index(place.z, nz)?, index(place.y, ny)?, index(place.x, nx)?])
+    }
+
+    /// The voxel inside that is nearest to a point by its centre, and that distance in voxels, among those within `reach` voxels; of equally near ones the first.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the box"
+    )]
+    pub fn nearest_inside(&self, point: &Point3<f64>, reach: f64) -> Option<([usize; 3], f64)> {
+        let place = (point - self.origin) / self.spacing;
+        let (nz, ny, nx) = self.inside.dim();
+        let range = |at: f64, n: usize| {
+            let from = (at - reach - 1.0).floor().clamp(0.0, n as f64) as usize;
+            from..(at + reach + 2.0).floor().clamp(0.0, n as f64) as usize
+        };
+        let mut best: Option<([usize; 3], f64)> = None;
+        for z in range(place.z, nz) {
+            for y in range(place.y, ny) {
+                for x in range(place.x, nx) {
+                    let centre = Vector3::new(x as f64, y as f64, z as f64).add_scalar(0.5);
+                    let distance = (centre - place).norm();
+                    if self.inside[[z, y, x]] && distance <= reach && best.is_none_or(|(_, d)| distance < d) {
+                        best = Some(([z, y, x], distance));
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Numbers of the connected areas of voxels, from 0 in the order of their first voxel; voxels that share a corner are connected.
+///
+/// ```
+/// use stereology_exemplar::grow::connected_areas;
+///
+/// assert_eq!(connected_areas(&[[0, 0, 0], [5, 5, 5], [0, 1, 1]]), [0, 1, 0]);
+/// ```
+#[must_use]
+pub fn connected_areas(voxels: &[[usize; 3]]) -> Vec<usize> {
+    let places: BTreeMap<[usize; 3], usize> = voxels.iter().enumerate().map(|(i, v)| (*v, i)).collect();
+    let mut areas = vec![usize::MAX; voxels.len()];
+    let mut next = 0;
+    for start in 0..voxels.len() {
+        if areas[start] != usize::MAX {
+            continue;
+        }
+        let mut open = vec![start];
+        areas[start] = next;
+        while let Some(at) = open.pop() {
+            for step in neighbours() {
+                let Some(near) = moved(voxels[at], step) else { continue };
+                if let Some(&other) = places.get(&near).filter(|&&other| areas[other] == usize::MAX) {
+                    areas[other] = next;
+                    open.push(other);
+                }
+            }
+        }
+        next += 1;
+    }
+    // A voxel given twice is in `places` once.
+    for at in 0..voxels.len() {
+        areas[at] = areas[places[&voxels[at]]];
+    }
+    areas
+}
+
+/// The 26 steps to neighbours.
+pub(super) fn neighbours() -> impl Iterator<Item = [isize; 3]> {
+    (0..27)
+        .filter(|step| *step != 13)
+        .map(|step: isize| [step / 9 - 1, step / 3 % 3 - 1, step % 3 - 1])
+}
+
+/// A voxel moved by a step, unless it leaves the box at its low end.
+pub(super) fn moved(voxel: [usize; 3], step: [isize; 3]) -> Option<[usize; 3]> {
+    Some([
+        voxel[0].checked_add_signed(step[0])?,
+        voxel[1].checked_add_signed(step[1])?,
+        voxel[2].checked_add_signed(step[2])?,
+    ])
+}
+
+/// Whether a voxel is in the box and inside the mask.
+pub(super) fn is_inside(mask: &ArrayView3<'_, bool>, voxel: [usize; 3]) -> bool {
+    mask.get(voxel).copied().unwrap_or(false)
+}

@@ -1,0 +1,77 @@
+//! The pictures a volume shows on planes normal to its axes.
+
+use ndarray::{ArrayView3, ArrayView4, Axis};
+use std::fmt::{self, Display};
+use std::str::FromStr;
+
+/// Parallel planes through a volume, named by the axes that lie in them.
+///
+/// Rows of a picture run along z and columns along x or y, so that layers which lie flat in the volume are horizontal on it; on `Xy` rows run along y, columns along x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Constant y: rows along z, columns along x.
+    Xz,
+    /// Constant x: rows along z, columns along y.
+    Yz,
+    /// Constant z: rows along y, columns along x.
+    Xy,
+}
+
+impl Family {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Xz, Self::Yz, Self::Xy];
+}
+
+impl Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Xz => "xz",
+            Self::Yz => "yz",
+            Self::Xy => "xy",
+        })
+    }
+}
+
+/// A name that is no family of planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("slices are xz, yz or xy")]
+pub struct FamilyError;
+
+impl FromStr for Family {
+    type Err = FamilyError;
+
+    fn from_str(name: &str) -> Result<Self, FamilyError> {
+        match name.trim() {
+            "xz" => Ok(Self::Xz),
+            "yz" => Ok(Self::Yz),
+            "xy" => Ok(Self::Xy),
+            _ => Err(FamilyError),
+        }
+    }
+}
+
+/// All pictures (row, column, channel) of one family of a volume (z, y, x, channel), without copying.
+///
+/// # Examples
+///
+/// ```
+/// use ndarray::Array4;
+/// use stereology_exemplar::measure::{Family, sections};
+///
+/// let volume = Array4::<f32>::zeros((2, 3, 4, 1));
+/// let shown = |family| { let all = sections(volume.view(), family); (all.len(), all[0].dim()) };
+/// assert_eq!(shown(Family::Xz), (3, (2, 4, 1)));
+/// assert_eq!(shown(Family::Yz), (4, (2, 3, 1)));
+/// assert_eq!(shown(Family::Xy), (2, (3, 4, 1)));
+/// ```
+#[must_use]
+pub fn sections(volume: ArrayView4<'_, f32>, family: Family) -> Vec<ArrayView3<'_, f32>> {
+    let normal = match family {
+        Family::Xz => Axis(1),
+        Family::Yz => Axis(2),
+        Family::Xy => Axis(0),
+    };
+    (0..volume.len_of(normal))
+        .map(|at| volume.index_axis_move(normal, at))
+        .collect()
+}

@@ -1,0 +1,221 @@
+//! Overlapping discs and spheres at random places: S2, lineal path, chords and local porosity in closed form.
+
+use ndarray::{Array2, Array3, Axis};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
+use stereology_exemplar::measure::{chord_lengths, lineal_path, local_porosity, radial_mean, two_point};
+
+/// Number of points of a Poisson process of mean `mean`.
+fn poisson(rng: &mut ChaCha8Rng, mean: f64) -> usize {
+    // Gaps of exponential length; the means here are hundreds.
+    let (mut at, mut count) = (0.0, 0);
+    loop {
+        at -= (1.0 - rng.random::<f64>()).ln();
+        if at > mean {
+            return count;
+        }
+        count += 1;
+    }
+}
+
+/// True outside discs of radius `radius`, `density` a unit of area; discs whose centres lie beyond the borders reach in.
+fn outside_discs(side: usize, radius: f64, density: f64, seed: u64) -> Array2<bool> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let wide = side as f64 + 2.0 * radius;
+    let mut phase = Array2::from_elem((side, side), true);
+    for _ in 0..poisson(&mut rng, density * wide * wide) {
+        let [cy, cx] = [0; 2].map(|_| rng.random::<f64>() * wide - radius);
+        let range = |c: f64| {
+            (c - radius).ceil().max(0.0) as usize..((c + radius).floor() + 1.0).clamp(0.0, side as f64) as usize
+        };
+        for y in range(cy) {
+            for x in range(cx) {
+                if (y as f64 - cy).hypot(x as f64 - cx) < radius {
+                    phase[[y, x]] = false;
+                }
+            }
+        }
+    }
+    phase
+}
+
+/// Area of the union of two discs of radius `r` at distance `d`.
+fn union_of_discs(r: f64, d: f64) -> f64 {
+    let common = if d < 2.0 * r {
+        2.0 * r * r * (d / (2.0 * r)).acos() - d / 2.0 * (4.0 * r * r - d * d).sqrt()
+    } else {
+        0.0
+    };
+    2.0 * PI * r * r - common
+}
+
+/// Means and standard errors of curves over independent pictures.
+fn averaged(curves: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let n = curves.len() as f64;
+    (0..curves[0].len())
+        .map(|k| {
+            let mean = curves.iter().map(|c| c[k]).sum::<f64>() / n;
+            let variance = curves.iter().map(|c| (c[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            (mean, (variance / n).sqrt())
+        })
+        .collect()
+}
+
+const RADIUS: f64 = 6.0;
+const DENSITY: f64 = 0.005;
+const PICTURES: u64 = 60;
+
+fn pictures() -> Vec<Array2<bool>> {
+    (0..PICTURES)
+        .map(|seed| outside_discs(160, RADIUS, DENSITY, seed))
+        .collect()
+}
+
+/// Student's t of 59 degrees of freedom exceeds 6.4 once in a million twice-sided tests of the 30 lags here.
+const T: f64 = 6.4;
+
+/// Two points are outside all discs if no centre lies in the union of the discs about them.
+#[test]
+fn two_point_correlation_of_overlapping_discs() {
+    let of = |phase: &Array2<bool>| {
+        let map = two_point(phase.mapv(|p| f64::from(u8::from(p))).view(), 30).unwrap();
+        map.row(30).iter().skip(30).copied().collect::<Vec<f64>>()
+    };
+    let curves: Vec<Vec<f64>> = pictures().iter().map(of).collect();
+    for (lag, (mean, error)) in averaged(&curves).iter().enumerate() {
+        let law = (-DENSITY * union_of_discs(RADIUS, lag as f64)).exp();
+        assert!(
+            (mean - law).abs() < T * error,
+            "lag {lag}: {mean} +- {error}, law {law}"
+        );
+    }
+}
+
+/// A segment is outside all discs if no centre lies within a radius of it; chords are exponential.
+#[test]
+fn lineal_path_and_chords_of_overlapping_discs() {
+    let all = pictures();
+    for axis in [Axis(0), Axis(1)] {
+        let curves: Vec<Vec<f64>> = all.iter().map(|p| lineal_path(p.view(), axis, 30)).collect();
+        for (z, (mean, error)) in averaged(&curves).iter().enumerate() {
+            // A path of z pixels is seen at z + 1 points only; between them a disc may just reach across the line.
+            let law = (-DENSITY * (PI * RADIUS * RADIUS + 2.0 * RADIUS * z as f64)).exp();
+            let missed = law * DENSITY * z as f64 * RADIUS * 0.02;
+            assert!(
+                (mean - law).abs() < T * error + missed,
+                "{axis:?} length {z}: {mean} +- {error}, law {law}"
+            );
+        }
+    }
+    // Chords of exponential length c, seen by whole pixels where they are short beside the picture: mean of those over m pixels is m + 1/c.
+    let c = 2.0 * RADIUS * DENSITY;
+    let means: Vec<Vec<f64>> = all
+        .iter()
+        .map(|p| {
+            let chords = chord_lengths(p.view(), Axis(1));
+            // Of the chords up to 40 pixels, the share up to 20: free of the border's choice, nearly.
+            let count = |most: usize| chords.iter().filter(|&&l| l <= most).count() as f64;
+            vec![count(20) / count(40)]
+        })
+        .collect();
+    let (share, error) = averaged(&means)[0];
+    // A chord of l pixels is left out if it touches the border: weight (160 − l).
+    let weight = |a: f64, b: f64| {
+        (0..1000)
+            .map(|i| a + (f64::from(i) + 0.5) * (b - a) / 1000.0)
+            .map(|l| (160.0 - l) * (-c * l).exp() * (b - a) / 1000.0)
+            .sum::<f64>()
+    };
+    let law = weight(0.5, 20.5) / weight(0.5, 40.5);
+    assert!((share - law).abs() < T * error + 0.003, "{share} +- {error}, law {law}");
+}
+
+/// Sections of overlapping spheres: S2 of the void phase, the sphere law.
+#[test]
+fn two_point_correlation_of_overlapping_spheres() {
+    let (radius, density, side) = (5.0, 0.0012, 48_usize);
+    let volumes = 40;
+    let of = |seed: u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let wide = side as f64 + 2.0 * radius;
+        let mut void = Array3::from_elem((side, side, side), 1.0_f64);
+        for _ in 0..poisson(&mut rng, density * wide.powi(3)) {
+            let c = [0; 3].map(|_| rng.random::<f64>() * wide - radius);
+            let range = |c: f64| {
+                (c - radius).ceil().max(0.0) as usize..((c + radius).floor() + 1.0).clamp(0.0, side as f64) as usize
+            };
+            for z in range(c[0]) {
+                for y in range(c[1]) {
+                    for x in range(c[2]) {
+                        let square = (z as f64 - c[0]).powi(2) + (y as f64 - c[1]).powi(2) + (x as f64 - c[2]).powi(2);
+                        if square < radius * radius {
+                            void[[z, y, x]] = 0.0;
+                        }
+                    }
+                }
+            }
+        }
+        // The whole volume, and one of its sections: the same function.
+        let volume = two_point(void.view(), 14).unwrap();
+        let section = two_point(void.index_axis(Axis(1), 24), 14).unwrap();
+        let line = |d: usize| volume[[14, 14, 14 + d]];
+        (0..15)
+            .map(line)
+            .chain((0..15).map(|d| section[[14 + d, 14]]))
+            .collect::<Vec<f64>>()
+    };
+    let curves: Vec<Vec<f64>> = (0..volumes).map(of).collect();
+    for (k, (mean, error)) in averaged(&curves).iter().enumerate() {
+        let (r, big) = ((k % 15) as f64, 4.0 * PI / 3.0 * radius.powi(3));
+        let union = if r < 2.0 * radius {
+            big * (1.0 + 3.0 * r / (4.0 * radius) - r.powi(3) / (16.0 * radius.powi(3)))
+        } else {
+            2.0 * big
+        };
+        let law = (-density * union).exp();
+        assert!((mean - law).abs() < 7.0 * error, "{k}: {mean} +- {error}, law {law}");
+    }
+}
+
+/// Squares of independent pixels hold a binomial number: variance φ (1 − φ) / side².
+#[test]
+fn local_porosity_of_noise_is_binomial() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let noise = Array2::from_shape_fn((512, 512), |_| rng.random::<f64>() < 0.3);
+    for side in [1_usize, 4, 8] {
+        let shares = local_porosity(noise.view(), side);
+        // Squares side by side are independent.
+        let apart: Vec<f64> = shares
+            .indexed_iter()
+            .filter(|((y, x), _)| y % side == 0 && x % side == 0)
+            .map(|(_, s)| *s)
+            .collect();
+        let n = apart.len() as f64;
+        let mean = apart.iter().sum::<f64>() / n;
+        let variance = apart.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
+        let law = 0.21 / (side * side) as f64;
+        // Variance of a variance: about 2 σ⁴ / n; five standard errors.
+        assert!(
+            (variance / law - 1.0).abs() < 5.0 * (2.0 / n).sqrt(),
+            "side {side}: {variance}, law {law}"
+        );
+        assert!((mean - 0.3).abs() < 5.0 * (law / n).sqrt());
+    }
+}
+
+/// Independent pixels: S2 is φ at 0 and φ² beyond, and its rings say so.
+#[test]
+fn two_point_correlation_of_noise() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let noise = Array2::from_shape_fn((300, 400), |_| f64::from(u8::from(rng.random::<f64>() < 0.4)));
+    let share = noise.mean().unwrap();
+    let rings = radial_mean(two_point(noise.view(), 20).unwrap().view());
+    assert!((rings[0] - share).abs() < 1e-9);
+    // A ring averages some hundred lags of 120,000 pairs each.
+    assert!(
+        rings[1..]
+            .iter()
+            .all(|s2| (s2 - share * share).abs() < 5.0 * 0.25 / 120_000_f64.sqrt())
+    );
+}

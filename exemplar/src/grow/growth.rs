@@ -482,6 +482,7 @@ impl Work<'_> {
             &scratch.beside,
             self.options.search,
             self.options.tolerance,
+            choice.to_bits(),
             &mut scratch.found,
         );
         (scratch.found[pick(choice, scratch.found.len())].1, least)

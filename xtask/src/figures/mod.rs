@@ -4,6 +4,7 @@ mod bars;
 mod density_recovery;
 mod estimators;
 mod grain_size_tools;
+mod growing;
 mod materials;
 mod packings;
 mod particles;
@@ -20,7 +21,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 16] = [
+    let figures: [(&str, Figure); 17] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -36,6 +37,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("figure-12-materials", materials::draw),
         ("packing", packings::draw),
         ("texture", textures::draw),
+        ("grow", growing::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

@@ -1,4 +1,5 @@
 //! Time to judge 32 slices of 128² pixels.
+#![allow(missing_docs, reason = "criterion's macros make functions without")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array3;

@@ -1,4 +1,5 @@
 //! Time to grow a block of 24³ voxels from a picture of 128² pixels, by window.
+#![allow(missing_docs, reason = "criterion's macros make functions without")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array3;

@@ -1,5 +1,7 @@
 //! How like are two textures? `cargo run --release -p stereology-exemplar --example judge`
 
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
 use ndarray::Array3;
 use std::ops::ControlFlow;
 use stereology_exemplar::grow::{GrowOptions, grow_picture};

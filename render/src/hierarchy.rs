@@ -14,17 +14,21 @@ pub(crate) struct Hierarchy {
     /// Places are measured from here, in this length, so that all lie in −1..1.
     middle: Point3<f64>,
     reach: f64,
+    /// Boxes that may wait to be looked at while a ray is followed.
+    most_waiting: usize,
 }
 
 /// Four boxes and what is in each.
 struct Node {
-    low: [[f32; 4]; 3],
-    high: [[f32; 4]; 3],
+    /// By axis: the low and the high sides.
+    sides: [[[f32; 4]; 2]; 3],
     child: [u32; 4],
 }
 
 /// The child is a triangle, not a node.
 const TRIANGLE: u32 = 1 << 31;
+/// So many waiting boxes need no memory of the heap: a tree of 20 floors.
+const FEW_WAITING: usize = 64;
 /// More than what a ray of length 4 loses to single precision.
 const MARGIN: f32 = 2e-6;
 
@@ -69,15 +73,18 @@ impl Hierarchy {
             nodes: Vec::with_capacity(corners.len() / 2 + 1),
             middle: nalgebra::center(&low, &high),
             reach: 0.5 * (high - low).norm(),
+            most_waiting: 0,
         };
         let tree = Bvh::build(&mut facets);
-        hierarchy.take(&tree.nodes, &facets, 0);
+        hierarchy.take(&tree.nodes, &facets, 0, 1);
         hierarchy
     }
 
-    /// Takes a node of the binary tree and its children's children; returns its number here.
+    /// Takes a node of the binary tree and its children's children, on this floor of ours; returns its number here.
     #[allow(clippy::cast_possible_truncation, reason = "meshes have fewer than 2^31 triangles")]
-    fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize) -> u32 {
+    fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize, floor: usize) -> u32 {
+        // A node is taken away and up to four are put there for it.
+        self.most_waiting = self.most_waiting.max(3 * floor + 1);
         let mut below = vec![(root, facets_bounds(tree, facets, root))];
         while below.len() < 4 {
             // The largest box that can be opened is opened.
@@ -102,27 +109,26 @@ impl Hierarchy {
         }
         let number = self.nodes.len();
         self.nodes.push(Node {
-            low: [[f32::INFINITY; 4]; 3],
-            high: [[f32::NEG_INFINITY; 4]; 3],
+            sides: [[[f32::INFINITY; 4], [f32::NEG_INFINITY; 4]]; 3],
             child: [0; 4],
         });
         for (k, (index, bounds)) in below.into_iter().enumerate() {
             let child = match &tree[index] {
                 BvhNode::Leaf { shape_index, .. } => TRIANGLE | *shape_index as u32,
-                BvhNode::Node { .. } => self.take(tree, facets, index),
+                BvhNode::Node { .. } => self.take(tree, facets, index, floor + 1),
             };
             let [low, high] = [bounds.min, bounds.max].map(|p| ((p - self.middle) / self.reach).map(|x| x as f32));
             let node = &mut self.nodes[number];
             node.child[k] = child;
             for axis in 0..3 {
-                node.low[axis][k] = low[axis] - MARGIN;
-                node.high[axis][k] = high[axis] + MARGIN;
+                node.sides[axis][0][k] = low[axis] - MARGIN;
+                node.sides[axis][1][k] = high[axis] + MARGIN;
             }
         }
         number as u32
     }
 
-    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1.
+    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1; a ray that is no number meets nothing.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "boxes have a margin for single precision"
@@ -135,15 +141,28 @@ impl Hierarchy {
         mut visit: impl FnMut(usize) -> Option<f64>,
     ) {
         let offset = (origin - self.middle) / self.reach;
+        // A ray that is no number would meet every box, those that are not there as well.
+        if !offset.iter().chain(direction.iter()).all(|x| x.is_finite()) {
+            return;
+        }
         // From far away single precision sees nothing: begin where the ray is nearest to the ball around all.
         let skipped = (-offset.dot(direction) - 1.5).max(0.0);
         let start = (offset + skipped * direction).map(|x| x as f32);
         let inverse = direction.map(|x| (x as f32).recip());
         let limit = |far: f64| (far / self.reach - skipped) as f32 + 2.0 * MARGIN;
         let mut far = limit(far);
-        let mut stack = Vec::with_capacity(64);
-        stack.push((0_u32, 0.0_f32));
-        while let Some((child, near)) = stack.pop() {
+        let (mut few, mut many) = ([(0_u32, 0.0_f32); FEW_WAITING], Vec::new());
+        let stack = if self.most_waiting <= FEW_WAITING {
+            &mut few[..]
+        } else {
+            many.resize(self.most_waiting, (0, 0.0));
+            &mut many[..]
+        };
+        // The first to be looked at is the root.
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (child, near) = stack[waiting];
             if near > far {
                 continue;
             }
@@ -156,16 +175,17 @@ impl Hierarchy {
             }
             let node = &self.nodes[child as usize];
             let entries = node.entries(&start, &inverse, far);
-            let first = stack.len();
+            let first = waiting;
             for (k, &entry) in entries.iter().enumerate() {
                 if entry < f32::INFINITY {
                     // Farthest at the bottom: inserted in order.
-                    let mut place = stack.len();
-                    stack.push((node.child[k], entry));
+                    let mut place = waiting;
                     while place > first && stack[place - 1].1 < entry {
-                        stack.swap(place - 1, place);
+                        stack[place] = stack[place - 1];
                         place -= 1;
                     }
+                    stack[place] = (node.child[k], entry);
+                    waiting += 1;
                 }
             }
         }
@@ -178,26 +198,25 @@ impl Node {
         let (mut near, mut end) = ([0.0_f32; 4], [far; 4]);
         for axis in 0..3 {
             let (from, by) = (start[axis], inverse[axis]);
-            let (first, last) = if by >= 0.0 {
-                (&self.low[axis], &self.high[axis])
-            } else {
-                (&self.high[axis], &self.low[axis])
-            };
-            for k in 0..4 {
-                // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
-                let (enter, leave) = ((first[k] - from) * by, (last[k] - from) * by);
-                near[k] = if enter > near[k] { enter } else { near[k] };
-                end[k] = if leave < end[k] { leave } else { end[k] };
-            }
+            let back = usize::from(by < 0.0);
+            let (first, last) = (&self.sides[axis][back], &self.sides[axis][1 - back]);
+            let along = |sides: &[f32; 4]| sides.map(|side| (side - from) * by);
+            // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
+            near = larger(along(first), near);
+            end = smaller(along(last), end);
         }
-        let mut entries = [f32::INFINITY; 4];
-        for k in 0..4 {
-            if near[k] <= end[k] {
-                entries[k] = near[k];
-            }
-        }
-        entries
+        std::array::from_fn(|k| if near[k] <= end[k] { near[k] } else { f32::INFINITY })
     }
+}
+
+/// The larger of each pair, the second where either is no number: one instruction for all four.
+fn larger(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
+}
+
+/// The smaller of each pair, likewise.
+fn smaller(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
 }
 
 fn facets_bounds(tree: &[BvhNode<f64, 3>], facets: &[Facet], index: usize) -> Aabb<f64, 3> {

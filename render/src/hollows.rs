@@ -65,7 +65,7 @@ impl World<'_> {
         let near = NEAR * self.extent;
         let (mut gone, mut before) = (0.0, f64::INFINITY);
         for _ in 0..MOST_STEPS {
-            let depth = -hollows(&(from + gone * direction));
+            let depth = -self.distance(hollows, &(from + gone * direction));
             // Rays begin near a wall, and leave it.
             if depth < near && depth <= before && gone > 0.0 || depth < 0.0 {
                 return Some(gone);
@@ -79,11 +79,16 @@ impl World<'_> {
         Some(gone)
     }
 
+    /// To the nearest void, as far as it matters here: infinity less infinity is no slope.
+    fn distance(&self, hollows: Hollows<'_>, at: &Point3<f64>) -> f64 {
+        hollows(at).clamp(-self.extent, self.extent)
+    }
+
     fn wall_surface(&self, hollows: Hollows<'_>, at: &Point3<f64>) -> Surface {
         let step = 2.0 * NEAR * self.extent;
         let slope = |axis: usize| {
             let aside = step * Vector3::ith(axis, 1.0);
-            hollows(&(at - aside)) - hollows(&(at + aside))
+            self.distance(hollows, &(at - aside)) - self.distance(hollows, &(at + aside))
         };
         let normal = Vector3::new(slope(0), slope(1), slope(2))
             .try_normalize(0.0)

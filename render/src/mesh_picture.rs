@@ -163,7 +163,7 @@ impl<'a> Material<'a> {
         Self { colour, hollows: None }
     }
 
-    /// With voids, cut open by the mesh: `distance` is that to the nearest surface of a void, negative in one, and never longer than the true distance. A void's wall has the colour a little behind it. The mesh should be closed.
+    /// With voids, cut open by the mesh: `distance` is that to the nearest surface of a void, negative in one, never longer than the true distance, infinite where there is none. A void's wall has the colour a little behind it. The mesh should be closed.
     #[must_use]
     pub fn with_hollows(self, distance: &'a (dyn Fn(&Point3<f64>) -> f64 + Sync)) -> Self {
         Self {

@@ -151,4 +151,30 @@ mod tests {
             }
         }
     }
+
+    /// Triangles ever smaller towards a corner make a tree of many floors; rays through it find what a search of all finds.
+    #[test]
+    fn deep_trees_are_searched_to_the_end() {
+        let mut mesh = TriangleMesh::default();
+        let place = |i: u32| (-0.6 * f64::from(i)).exp();
+        for i in 0..700 {
+            let (at, size) = (place(i), 0.01 * place(i));
+            let corners = [[at, 0.0, 0.0], [at, size, 0.0], [at, 0.0, size]];
+            mesh.vertices.extend(corners.map(Point3::from));
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        let scene = Scene::new(&mesh);
+        for i in 0..700 {
+            let origin = Point3::new(-1.0, 0.003 * place(i), 0.003 * place(i));
+            let nearest = (0..mesh.triangles.len())
+                .filter_map(|facet| scene.meet(facet, &origin, &Vector3::x()))
+                .map(|hit| hit.distance)
+                .fold(f64::INFINITY, f64::min);
+            let found = scene.first_hit(&origin, &Vector3::x(), f64::INFINITY);
+            assert_eq!(
+                found.map_or(f64::INFINITY, |hit| hit.distance).to_bits(),
+                nearest.to_bits()
+            );
+        }
+    }
 }

@@ -39,6 +39,7 @@
 //! ```
 
 mod body;
+mod chord;
 mod closed_mesh;
 mod coloured_mesh;
 #[cfg(feature = "io")]
@@ -86,6 +87,7 @@ mod unit_body;
 mod winding;
 
 pub use body::{Body, BodyError, BodyKind};
+pub use chord::Chord;
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};
 pub use coloured_mesh::ColouredMesh;
 #[cfg(feature = "io")]

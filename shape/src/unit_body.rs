@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, UnitVector3, Vector3, Vector4};
 
 use crate::body::{Body, BodyKind, mesh_profile_areas};
+use crate::chord::Chord;
 use crate::closed_mesh::ClosedMesh;
 use crate::convex::{SupportMap, half_spaces};
 use crate::elliptic;
@@ -169,6 +170,36 @@ impl UnitBody {
     #[must_use]
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         self.inner.contains(p)
+    }
+
+    /// Where the line `origin + t direction` is inside, for balls, ellipsoids and convex bodies of few faces; `None` for others.
+    ///
+    /// Cost: one product a face. A zero direction has no chord to speak of.
+    ///
+    /// ```
+    /// use nalgebra::{Point3, Vector3};
+    /// use stereology_shape::{Body, UnitBody};
+    ///
+    /// let ball = UnitBody::new(&Body::sphere(1.0)?);
+    /// let chord = ball.chord(&Point3::new(-2.0, 0.3, 0.0), &Vector3::x()).expect("balls have chords");
+    /// assert!((chord.sure[0] - 1.6).abs() < 1e-9 && (chord.sure[1] - 2.4).abs() < 1e-9);
+    /// # Ok::<(), stereology_shape::BodyError>(())
+    /// ```
+    #[must_use]
+    pub fn chord(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Chord> {
+        let from = &origin.coords;
+        match &self.inner.form {
+            Form::Sphere => Some(Chord::of_ball(0.5, from, direction)),
+            Form::Ellipsoid { axes } => {
+                let (from, along) = (from.component_div(axes), direction.component_div(axes));
+                Some(Chord::of_ball(1.0, &from, &along))
+            }
+            Form::Polytope { half_spaces, .. } => {
+                let ball = Chord::of_ball(self.inner.bounding_radius, from, direction);
+                Some(ball.below(half_spaces, from, direction))
+            }
+            Form::Mesh { .. } => None,
+        }
     }
 
     /// Distance to the surface, negative inside; true distances (ellipsoid: to about 1e-12).

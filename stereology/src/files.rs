@@ -64,7 +64,7 @@ pub enum FileError {
     },
     /// Another kind of file, or of another version.
     #[error(
-        "{path}: its schema is {found:?}, this program reads {SOLID_SCHEMA:?}; make the solid again with this version"
+        "{path}: its schema is {found:?}, this program reads {SOLID_SCHEMA:?}; take the version of the program that wrote it, or make the solid again with this one"
     )]
     Schema {
         /// Which file.
@@ -207,6 +207,12 @@ struct SolidFile {
     voids: Vec<usize>,
 }
 
+/// The kind and the version of a file.
+#[derive(Deserialize)]
+struct Schema {
+    schema: String,
+}
+
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct MeshEntry {
     vertices: Vec<[f64; 3]>,
@@ -310,13 +316,12 @@ pub struct SavedSolid {
 pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
     let folder = folder.as_ref();
     let path = folder.join("solid.json");
-    let file: SolidFile = read_json(&path)?;
-    if file.schema != SOLID_SCHEMA {
-        return Err(FileError::Schema {
-            path,
-            found: file.schema,
-        });
+    // Asked first: another version may hold other fields.
+    let Schema { schema } = read_json(&path)?;
+    if schema != SOLID_SCHEMA {
+        return Err(FileError::Schema { path, found: schema });
     }
+    let file: SolidFile = read_json(&path)?;
     let packing_path = folder.join("packing.json");
     let packing = PackingFile::read(&packing_path)?;
     let (particles, period) = packing
@@ -337,7 +342,7 @@ pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
     let residual = read_texture(&folder.join("texture.npy"), file.voxel)?;
     let solid = Solid::new(bodies, particles, file.colours, period, file.binder, Some(residual))
         .and_then(|solid| solid.with_voids(&file.voids))
-        .map_err(|error: SolidError| FileError::value(&path, error))?;
+        .map_err(|error: SolidError| FileError::value(folder, error))?;
     Ok(SavedSolid {
         solid,
         shapes: packing.shapes,

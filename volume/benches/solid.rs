@@ -1,4 +1,4 @@
-//! Points, voxels and pictures per second of a packing of 5,000 rocks.
+//! Points, voxels and pictures per second of a packing of 5,000 rocks; points of 100 to 100,000 rocks.
 #![expect(missing_docs, reason = "criterion's macros make undocumented functions")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -11,9 +11,9 @@ use stereology_shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation
 use stereology_volume::{Axis, Residual, SlicePlane, Solid};
 
 /// Rocks on a jittered lattice, a fifth of them overlapping a little: as many to search as in a packing.
-fn rocks() -> Solid {
+fn rocks(n: u32) -> Solid {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let (n, side) = (17, 256.0);
+    let side = 256.0;
     let spacing = side / f64::from(n);
     let particles: Vec<Particle> = (0..n * n * n)
         .map(|i| Particle {
@@ -41,12 +41,33 @@ fn rocks() -> Solid {
     Solid::new(bodies, particles, colours, period, [0.5; 3], Some(residual)).expect("a solid")
 }
 
-fn queries(c: &mut Criterion) {
-    let solid = rocks();
+fn points() -> Vec<Point3<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let points: Vec<Point3<f64>> = (0..4096)
+    (0..4096)
         .map(|_| Point3::from(Vector3::from_fn(|_, _| 256.0 * rng.random::<f64>())))
-        .collect();
+        .collect()
+}
+
+fn numbers_of_particles(c: &mut Criterion) {
+    let points = points();
+    let mut group = c.benchmark_group("colour_at");
+    group
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_millis(800))
+        .throughput(Throughput::Elements(4096));
+    for n in [5, 10, 22, 46_u32] {
+        let solid = rocks(n);
+        group.bench_function(format!("{} rocks", n.pow(3)), |b| {
+            b.iter(|| points.iter().map(|p| solid.colour_at(p)[0]).sum::<f32>());
+        });
+    }
+    group.finish();
+}
+
+fn queries(c: &mut Criterion) {
+    let solid = rocks(17);
+    let points = points();
     let mut group = c.benchmark_group("4913 rocks");
     group
         .sample_size(10)
@@ -73,9 +94,9 @@ fn queries(c: &mut Criterion) {
     group.bench_function("section_profiles", |b| {
         b.iter(|| solid.section_profiles(Axis::Z, 100.0).len());
     });
-    group.bench_function("new", |b| b.iter(rocks));
+    group.bench_function("new", |b| b.iter(|| rocks(17)));
     group.finish();
 }
 
-criterion_group!(benches, queries);
+criterion_group!(benches, queries, numbers_of_particles);
 criterion_main!(benches);

@@ -5,6 +5,7 @@
     reason = "cells are fewer than 2^27, particles and their places checked by Solid::new"
 )]
 
+use crate::row::Row;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
@@ -14,7 +15,7 @@ const CELLS_PER_PARTICLE: f64 = 32.0;
 const MOST_CELLS_PER_SIDE: f64 = 512.0;
 /// Share of a cell by which its bounds are widened, more than the rounding of its coordinates.
 const SLACK: f64 = 1e-9;
-const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// The particles as placed bodies, and the cells of the box that they reach into.
 #[derive(Clone, Debug)]
@@ -187,6 +188,48 @@ impl Cells {
             .iter()
             .find(inside)
             .map(|image| image.particle as usize)
+    }
+
+    /// The particle at each point of a row of the box, or [`NONE`]: what [`Self::particle_at`] says, at the cost of a chord a particle.
+    pub(crate) fn particles_along(&self, bodies: &[UnitBody], row: &Row, ids: &mut [u32]) {
+        ids.fill(NONE);
+        let [_, j, k] = self.cell_of(&Point3::new(0.0, row.y, row.z));
+        let mut before: &[Image] = &[];
+        for i in 0..self.counts[0] {
+            let images = self.images_in(self.number([i, j, k]));
+            for image in images {
+                let same = |other: &Image| other.particle == image.particle && other.centre == image.centre;
+                if !before.iter().any(same) {
+                    self.mark(bodies, image, row, ids);
+                }
+            }
+            before = images;
+        }
+    }
+
+    /// Marks the points of a row that are in one image of a particle, unless they are in one of lower index.
+    fn mark(&self, bodies: &[UnitBody], image: &Image, row: &Row, ids: &mut [u32]) {
+        let placed = &self.placed[image.particle as usize];
+        let body = &bodies[placed.shape];
+        let offset = |x: f64| Vector3::new(x, row.y, row.z) - image.centre.coords;
+        let beside = offset(image.centre.x);
+        let half = (image.outer_squared - beside.norm_squared()).sqrt();
+        // Not a number if the row passes the particle by.
+        if half.is_nan() {
+            return;
+        }
+        // Along x, from the place beside the centre on.
+        let chord = body.chord(&placed.local(&beside), &placed.to_local.column(0).into_owned());
+        let (sure, possible) = chord.map_or(([0.0; 2], [-half, half]), |chord| (chord.sure, chord.possible));
+        let [from, end] = possible.map(|end| row.count_to(image.centre.x + end, ids.len()));
+        for (i, id) in ids.iter_mut().enumerate().take(end).skip(from) {
+            let offset = offset(row.x(i));
+            let is_inside = offset.x > sure[0] && offset.x < sure[1]
+                || offset.norm_squared() < image.outer_squared && body.contains(&placed.local(&offset));
+            if is_inside {
+                *id = (*id).min(image.particle);
+            }
+        }
     }
 
     /// Signed distance from a point of the box to the nearest surface: to that of the particle it is in, negative; infinite without particles.

@@ -62,6 +62,7 @@ mod carve;
 mod cells;
 mod charts;
 mod residual;
+mod row;
 mod sections;
 mod slice;
 mod solid;

@@ -133,54 +133,144 @@ impl Field {
 
     /// The field at a point of the box.
     pub(crate) fn at(&self, p: &Point3<f64>, lookup: Lookup) -> [f32; 3] {
-        let place = p.coords.component_mul(&self.voxels_per_length);
+        self.row([p.y, p.z], lookup).at(p.x)
+    }
+
+    /// The field along a row of the box.
+    pub(crate) fn row(&self, yz: [f64; 2], lookup: Lookup) -> FieldRow<'_> {
         let [nx, ny, _] = self.sizes;
-        let sample = |[x, y, z]: [usize; 3]| self.samples[(z * ny + y) * nx + x];
+        let start = |y: usize, z: usize| (z * ny + y) * nx;
         if lookup == Lookup::Nearest {
-            return sample([0, 1, 2].map(|k| place[k] as usize % self.sizes[k]));
+            let [y, z] = [0, 1].map(|k| (yz[k] * self.voxels_per_length[k + 1]) as usize % self.sizes[k + 1]);
+            return FieldRow {
+                field: self,
+                lookup,
+                starts: [start(y, z); 4],
+                weights: [1.0, 0.0, 0.0, 0.0],
+                variance: [[0.0; 3]; 2],
+                blended: Vec::new(),
+            };
         }
-        let (mut low, mut high, mut share) = ([0; 3], [0; 3], [0.0_f32; 3]);
-        for k in 0..3 {
-            // Half a voxel off the centres, and a whole period on, so that it is positive.
-            let place = place[k] - 0.5 + self.sizes[k] as f64;
-            let floor = place as usize;
-            share[k] = (place - floor as f64) as f32;
-            low[k] = floor % self.sizes[k];
-            high[k] = if low[k] + 1 == self.sizes[k] { 0 } else { low[k] + 1 };
-        }
-        let mut value = [0.0; 3];
-        for corner in 0..8 {
-            let upper = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
-            let weight: f32 = (0..3)
-                .map(|k| if upper[k] == 1 { share[k] } else { 1.0 - share[k] })
-                .product();
-            let voxel = sample([0, 1, 2].map(|k| if upper[k] == 1 { high[k] } else { low[k] }));
-            (0..3).for_each(|c| value[c] += weight * voxel[c]);
-        }
+        let [y, z] = [0, 1].map(|k| self.between(k + 1, yz[k]));
+        let mut variance = [[0.0; 3]; 2];
         if lookup == Lookup::VarianceKept {
-            self.restored(value, share)
-        } else {
-            value
+            let [ay, az] = [y, z].map(|of| 2.0 * of.share * (1.0 - of.share));
+            let weights = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
+            for (lag, covariance) in self.covariance.iter().enumerate() {
+                (0..3).for_each(|c| variance[lag & 1][c] += weights[lag >> 1] * covariance[c]);
+            }
+        }
+        FieldRow {
+            field: self,
+            lookup,
+            starts: [
+                start(y.low, z.low),
+                start(y.high, z.low),
+                start(y.low, z.high),
+                start(y.high, z.high),
+            ],
+            weights: [
+                (1.0 - y.share) * (1.0 - z.share),
+                y.share * (1.0 - z.share),
+                (1.0 - y.share) * z.share,
+                y.share * z.share,
+            ],
+            variance,
+            blended: Vec::new(),
         }
     }
 
-    fn restored(&self, value: [f32; 3], share: [f32; 3]) -> [f32; 3] {
-        let apart = share.map(|f| 2.0 * f * (1.0 - f));
-        let mut variance = [0.0; 3];
-        for (lag, covariance) in self.covariance.iter().enumerate() {
-            let weight: f32 = (0..3)
-                .map(|k| if lag >> k & 1 == 1 { apart[k] } else { 1.0 - apart[k] })
-                .product();
-            (0..3).for_each(|c| variance[c] += weight * covariance[c]);
+    /// The voxels on both sides of a place along an axis.
+    fn between(&self, axis: usize, x: f64) -> Between {
+        let n = self.sizes[axis];
+        // Half a voxel off the centres, and a whole period on, so that it is positive.
+        let place = x * self.voxels_per_length[axis] - 0.5 + n as f64;
+        let floor = place as usize;
+        let low = floor % n;
+        Between {
+            low,
+            high: if low + 1 == n { 0 } else { low + 1 },
+            share: (place - floor as f64) as f32,
         }
+    }
+}
+
+/// Two neighbouring voxels and how near to the second.
+#[derive(Clone, Copy)]
+struct Between {
+    low: usize,
+    high: usize,
+    share: f32,
+}
+
+/// A field at one y and z.
+pub(crate) struct FieldRow<'a> {
+    field: &'a Field,
+    lookup: Lookup,
+    /// Where the rows of voxels around it begin, and their shares.
+    starts: [usize; 4],
+    weights: [f32; 4],
+    /// What trilinear weights leave of the variance: at the voxels' x, and what is in it of their neighbours'.
+    variance: [[f32; 3]; 2],
+    /// The four rows blended, if they are to be read more than once.
+    blended: Vec<[f32; 3]>,
+}
+
+impl FieldRow<'_> {
+    /// The same row, to be read at `reads` places: blended at once if that is less work.
+    pub(crate) fn prepared_for(mut self, reads: usize) -> Self {
+        if 2 * reads > self.field.sizes[0] {
+            self.blended = (0..self.field.sizes[0]).map(|voxel| self.blend(voxel)).collect();
+        }
+        self
+    }
+
+    /// The field at an x; the same bits prepared or not.
+    pub(crate) fn at(&self, x: f64) -> [f32; 3] {
+        let place = self.place(x);
+        if self.blended.is_empty() {
+            self.between(self.blend(place.low), self.blend(place.high), place.share)
+        } else {
+            self.between(self.blended[place.low], self.blended[place.high], place.share)
+        }
+    }
+
+    fn place(&self, x: f64) -> Between {
+        if self.lookup == Lookup::Nearest {
+            let voxel = (x * self.field.voxels_per_length.x) as usize % self.field.sizes[0];
+            Between {
+                low: voxel,
+                high: voxel,
+                share: 0.0,
+            }
+        } else {
+            self.field.between(0, x)
+        }
+    }
+
+    /// The four rows at the x of a voxel.
+    fn blend(&self, voxel: usize) -> [f32; 3] {
+        let [a, b, c, d] = self.starts.map(|start| self.field.samples[start + voxel]);
+        let w = self.weights;
+        [0, 1, 2].map(|k| (w[0] * a[k] + w[1] * b[k]) + (w[2] * c[k] + w[3] * d[k]))
+    }
+
+    fn between(&self, low: [f32; 3], high: [f32; 3], f: f32) -> [f32; 3] {
+        let value = [0, 1, 2].map(|c| (1.0 - f) * low[c] + f * high[c]);
+        if self.lookup != Lookup::VarianceKept {
+            return value;
+        }
+        let Field { mean, covariance, .. } = self.field;
+        let apart = 2.0 * f * (1.0 - f);
         [0, 1, 2].map(|c| {
-            let whole = self.covariance[0][c];
+            let whole = covariance[0][c];
+            let left = (1.0 - apart) * self.variance[0][c] + apart * self.variance[1][c];
             let gain = if whole > 0.0 {
-                (whole / variance[c].max(whole / MOST_GAIN)).sqrt()
+                (whole / left.max(whole / MOST_GAIN)).sqrt()
             } else {
                 1.0
             };
-            self.mean[c] + (value[c] - self.mean[c]) * gain
+            mean[c] + (value[c] - mean[c]) * gain
         })
     }
 }

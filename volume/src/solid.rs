@@ -1,7 +1,8 @@
 //! The solid: what is at a point of a material that repeats.
 
 use crate::cells::Cells;
-use crate::residual::{Field, Lookup, Residual};
+use crate::residual::{Field, FieldRow, Lookup, Residual};
+use crate::row::Row;
 use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
 use ndarray::ArrayView4;
@@ -331,6 +332,20 @@ impl Solid {
         self.cells.particle_at(&self.bodies, p)
     }
 
+    /// The particle at each point of a row of the box, for [`index`](crate::row::index): the same as [`Self::id_within`] says.
+    pub(crate) fn ids_along(&self, row: &Row, ids: &mut [u32]) {
+        self.cells.particles_along(&self.bodies, row, ids);
+    }
+
+    /// The residual of binder and particles along a row, to be read at so many points.
+    pub(crate) fn residual_along(&self, row: &Row, points: usize) -> Option<[FieldRow<'_>; 2]> {
+        let fields = self.residual.as_ref()?;
+        Some(
+            [&fields.binder, &fields.particles]
+                .map(|field| field.row([row.y, row.z], self.lookup).prepared_for(points)),
+        )
+    }
+
     pub(crate) fn mean_colour(&self, id: Option<usize>) -> [f32; 3] {
         id.map_or(self.binder, |id| self.colours[id])
     }
@@ -360,7 +375,12 @@ pub(crate) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 /// The only place where colours are clamped: encoded values to bytes.
 #[allow(clippy::cast_possible_truncation, reason = "clamped to the range of u8")]
 pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
-    colour.map(|value| (value * 255.0).round().clamp(0.0, 255.0) as u8)
+    colour.map(|value| {
+        let value = value * 255.0;
+        // A cast rounds down and clamps; what it took away decides, as in `round`, which is a slow call.
+        let floor = value as u8;
+        floor.saturating_add(u8::from(value - f32::from(floor) >= 0.5))
+    })
 }
 
 fn check_particles(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<(), SolidError> {

@@ -1,6 +1,7 @@
 //! Particles that are voids: the pores of a sponge, the bubbles of a foam.
 
-use crate::cells::Cells;
+use crate::cells::{Cells, NONE};
+use crate::row::Row;
 use crate::{Solid, SolidError};
 use nalgebra::Point3;
 use std::sync::Arc;
@@ -72,6 +73,14 @@ impl Solid {
         self.voids
             .as_ref()
             .is_some_and(|voids| voids.cells.particle_at(self.bodies(), &p).is_some())
+    }
+
+    /// The void at each point of a row of the box.
+    pub(crate) fn voids_along(&self, row: &Row, ids: &mut [u32]) {
+        match &self.voids {
+            Some(voids) => voids.cells.particles_along(self.bodies(), row, ids),
+            None => ids.fill(NONE),
+        }
     }
 
     /// Distance to the nearest surface of a void, negative in one; infinite without voids.

@@ -6,9 +6,10 @@
 )]
 
 use crate::Solid;
-use crate::solid::{add, to_bytes};
+use crate::row::{Row, index};
+use crate::solid::to_bytes;
 use nalgebra::{Point3, Vector3};
-use ndarray::ArrayViewMut3;
+use ndarray::{ArrayViewMut2, ArrayViewMut3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -79,6 +80,17 @@ impl VoxelGrid {
         let along = |n: usize, axis: usize| (n as f64 + 0.5) * self.spacing[axis];
         Point3::new(along(i, 0), along(j, 1), along(k, 2))
     }
+
+    /// The points at this offset from the centres of a row of voxels.
+    fn row(&self, y: usize, z: usize, offset: &Vector3<f64>) -> Row {
+        let first = self.centre([0, y, z]) + offset;
+        Row {
+            y: first.y,
+            z: first.z,
+            step: self.spacing[0],
+            shift: offset.x,
+        }
+    }
 }
 
 impl Solid {
@@ -115,52 +127,56 @@ impl Solid {
     /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, rows shared among threads.
     ///
     /// The colour of a voxel is the mean over `grid.samples`³ points spread evenly in it; 4³ leave steps of 1/64 at the borders of particles.
-    pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
+    pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, u8>) {
         let n = grid.samples.max(1);
         let along = |i: usize, axis: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * grid.spacing[axis];
         let offsets: Vec<Vector3<f64>> = (0..n.pow(3))
             .map(|i| Vector3::new(along(i % n, 0), along(i / n % n, 1), along(i / n / n, 2)))
             .collect();
         let share = 1.0 / offsets.len() as f32;
-        fill(grid, z, slab, |centre| {
-            let mut colour = [0.0; 3];
+        let buffers = || (vec![0; grid.counts[0]], vec![[0.0; 3]; grid.counts[0]]);
+        let fill = |(ids, sums): &mut (Vec<u32>, Vec<[f32; 3]>), (y, mut voxels): (usize, ArrayViewMut2<'_, u8>)| {
+            sums.fill([0.0; 3]);
             for offset in &offsets {
-                colour = add(colour, self.colour_within(&(centre + offset)));
+                let row = grid.row(y, z, offset);
+                self.ids_along(&row, ids);
+                self.add_colours_along(&row, ids, sums);
             }
-            to_bytes(colour.map(|c| c * share))
-        });
-    }
-
-    /// Colour at a point of the box.
-    fn colour_within(&self, p: &Point3<f64>) -> [f32; 3] {
-        let id = self.id_within(p);
-        let mean = self.mean_colour(id);
-        match self.residual_voxel() {
-            None => mean,
-            Some(_) => add(mean, self.residual_within(p, id.is_some())),
-        }
+            for (mut voxel, sum) in voxels.outer_iter_mut().zip(sums) {
+                let bytes = to_bytes(sum.map(|c| c * share));
+                (0..3).for_each(|c| voxel[c] = bytes[c]);
+            }
+        };
+        rows(&mut slab).into_par_iter().enumerate().for_each_init(buffers, fill);
     }
 
     /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
-        fill(grid, z, slab, |p| [self.id_within(p).map_or(0, |id| id as u32 + 1)]);
+        let ids = |row: &Row, ids: &mut [u32]| self.ids_along(row, ids);
+        fill_by_id(grid, z, slab, ids, |id| id.map_or(0, |id| id as u32 + 1));
     }
 
     /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
     pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        fill(grid, z, slab, |p| {
-            [self.id_within(p).map_or(0, |id| self.particles()[id].category + 1)]
+        let ids = |row: &Row, ids: &mut [u32]| self.ids_along(row, ids);
+        fill_by_id(grid, z, slab, ids, |id| {
+            id.map_or(0, |id| self.particles()[id].category + 1)
         });
     }
 
     /// Fills the slab at `z` with signed distances.
-    pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, f32>) {
-        fill(grid, z, slab, |p| [self.distance_at(p) as f32]);
+    pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, f32>) {
+        rows(&mut slab).into_par_iter().enumerate().for_each(|(y, mut row)| {
+            for (x, voxel) in row.iter_mut().enumerate() {
+                *voxel = self.distance_at(&grid.centre([x, y, z])) as f32;
+            }
+        });
     }
 
     /// Fills the slab at `z` with 0 in voids, else 255.
     pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        fill(grid, z, slab, |p| [if self.is_void_at(p) { 0 } else { 255 }]);
+        let voids = |row: &Row, ids: &mut [u32]| self.voids_along(row, ids);
+        fill_by_id(grid, z, slab, voids, |void| if void.is_some() { 0 } else { 255 });
     }
 
     /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
@@ -272,19 +288,24 @@ impl VoxelFile<'_> {
     }
 }
 
-/// Asks `value` for every voxel of a slab. The centres lie in the box: no wrapping is needed.
-fn fill<T: Send, const CHANNELS: usize>(
+/// Asks `value` for every voxel of a slab, of the particle at its centre. The centres lie in the box: no wrapping is needed.
+fn fill_by_id<T: Send>(
     grid: &VoxelGrid,
     z: usize,
     mut slab: ArrayViewMut3<'_, T>,
-    value: impl Fn(&Point3<f64>) -> [T; CHANNELS] + Sync,
+    ids_along: impl Fn(&Row, &mut [u32]) + Sync,
+    value: impl Fn(Option<usize>) -> T + Sync,
 ) {
-    let mut rows: Vec<_> = slab.outer_iter_mut().collect();
-    rows.par_iter_mut().enumerate().for_each(|(y, row)| {
-        for (x, mut voxel) in row.outer_iter_mut().enumerate() {
-            for (place, sample) in voxel.iter_mut().zip(value(&grid.centre([x, y, z]))) {
-                *place = sample;
-            }
+    let buffer = || vec![0; grid.counts[0]];
+    let fill = |ids: &mut Vec<u32>, (y, mut voxels): (usize, ArrayViewMut2<'_, T>)| {
+        ids_along(&grid.row(y, z, &Vector3::zeros()), ids);
+        for (voxel, &id) in voxels.iter_mut().zip(ids.iter()) {
+            *voxel = value(index(id));
         }
-    });
+    };
+    rows(&mut slab).into_par_iter().enumerate().for_each_init(buffer, fill);
+}
+
+fn rows<'a, T>(slab: &'a mut ArrayViewMut3<'_, T>) -> Vec<ArrayViewMut2<'a, T>> {
+    slab.outer_iter_mut().collect()
 }

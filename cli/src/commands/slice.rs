@@ -96,9 +96,10 @@ impl Slice {
 
 /// Opens a folder of `stereology synthesize`.
 pub fn open_solid(folder: &Path) -> Result<SavedSolid, Failure> {
-    if !folder.join("solid.json").is_file() {
+    let parts = ["solid.json", "packing.json", "texture.npy"];
+    if let Some(missing) = parts.iter().find(|part| !folder.join(part).is_file()) {
         return Err(Failure::run(format!(
-            "{}: holds no solid.json; give a folder written by `stereology synthesize`",
+            "{}: holds no {missing}; give a folder written by `stereology synthesize`",
             folder.display()
         )));
     }

@@ -1,7 +1,10 @@
 //! What cannot be shown is refused with a reason.
 
 use nalgebra::{Point3, Vector3};
-use stereology_render::{BlockOptions, Camera, RenderError, RenderOptions, render_block, render_mesh};
+use std::ops::ControlFlow;
+use stereology_render::{
+    BlockOptions, Camera, Material, RenderError, RenderOptions, render_block, render_material, render_mesh,
+};
 use stereology_shape::TriangleMesh;
 
 fn refused(mesh: &TriangleMesh, camera: Camera, options: RenderOptions) -> RenderError {
@@ -91,4 +94,25 @@ fn impossible_options() {
     let sides = Vector3::new(1.0, 0.0, 1.0);
     let refused = render_block(&|_| [0.5; 3], sides, &BlockOptions::default());
     assert!(matches!(refused, Err(RenderError::Sides { .. })));
+}
+
+/// Distances to voids may be infinite where there is no void, whichever way a wall's normal is asked; what is no number ends the way of a ray.
+#[test]
+fn distances_that_are_infinite_or_no_numbers() {
+    let cube = TriangleMesh::cuboid([1.0; 3]);
+    let options = RenderOptions::default().with_size(48, 48);
+    let picture = |distance: &(dyn Fn(&Point3<f64>) -> f64 + Sync)| {
+        let material = Material::new(&|_| [0.7; 3]).with_hollows(distance);
+        render_material(&cube, &material, &Camera::default(), &options, &|_| {
+            ControlFlow::Continue(())
+        })
+        .unwrap()
+    };
+    let ball = |p: &Point3<f64>| (p - Point3::new(0.0, 0.5, 0.0)).norm() - 0.35;
+    // The wall of the void lies in the plane beyond which there is said to be none.
+    let walled = |p: &Point3<f64>| if p.x > 0.0 { f64::INFINITY } else { ball(p).max(p.x) };
+    let whole = picture(&|_| f64::INFINITY);
+    assert_ne!(picture(&walled), whole);
+    picture(&|p| if p.z > 0.1 { f64::NAN } else { ball(p) });
+    picture(&|p| if p.x > 0.1 { f64::NEG_INFINITY } else { ball(p) });
 }

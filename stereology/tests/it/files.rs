@@ -70,3 +70,85 @@ fn broken_folders_are_refused() {
     std::fs::write(folder.path().join("packing.json"), r#"{"box":[1,1,1],"shapes":[],"particles":[{"shape":0,"size":1,"category":0,"position":[0,0,0],"orientation":[1,0,0,0]}]}"#).unwrap();
     assert!(told(PackingFile::read(folder.path().join("packing.json")).unwrap_err()).contains("particle 0"));
 }
+
+/// One fault in each file of a good folder: refused, and told where and what.
+#[test]
+fn damaged_solids_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let types = ParticleTypes::parse(&["sphere"]).unwrap();
+    let particle = Particle {
+        shape: 0,
+        size: 4.0,
+        category: 0,
+        position: Point3::new(4.0, 4.0, 4.0),
+        orientation: UnitQuaternion::identity(),
+    };
+    let period = PeriodicBox::new(Vector3::repeat(8.0)).unwrap();
+    let field = Array4::zeros((4, 4, 4, 3));
+    let residual = Residual {
+        particles: field.clone(),
+        binder: field,
+        voxel: 2.0,
+    };
+    let solid = Solid::new(
+        types.unit_bodies(),
+        vec![particle],
+        vec![[0.5; 3]],
+        period,
+        [0.8; 3],
+        Some(residual.clone()),
+    )
+    .unwrap();
+    save_solid(folder.path(), &solid, &residual, &types).unwrap();
+    open_solid(folder.path()).unwrap();
+
+    let edits: [(&str, &str, &str, &str); 9] = [
+        (
+            "solid.json",
+            "stereology.solid/1",
+            "stereology.solid/2",
+            "stereology.solid/2",
+        ),
+        (
+            "solid.json",
+            "stereology.solid/1\"",
+            "stereology.solid/7\",\"new\":1,\"binder_of_7\":0",
+            "stereology.solid/7",
+        ),
+        ("solid.json", "\"voxel\":2.0", "\"voxel\":0.0", "voxel 0"),
+        (
+            "solid.json",
+            "\"colours\":[[",
+            "\"colours\":[[0,0,0],[",
+            "2 colours for 1 particles",
+        ),
+        ("packing.json", "\"size\":4.0", "\"size\":-4.0", "size"),
+        ("packing.json", "\"shape\":0", "\"shape\":3", "shape 3"),
+        ("packing.json", "\"box\":[8.0", "\"box\":[0.0", "0 × 8 × 8"),
+        ("packing.json", "\"sphere\"", "\"gone.obj\"", "gone.obj"),
+        ("packing.json", "}]", "", "packing.json"),
+    ];
+    for (file, from, to, said) in edits {
+        let good = std::fs::read_to_string(at(file)).unwrap();
+        let bad = good.replacen(from, to, 1);
+        assert_ne!(good, bad, "{from}");
+        std::fs::write(at(file), bad).unwrap();
+        let told = open_solid(folder.path()).unwrap_err().to_string();
+        assert!(told.contains(said), "{to}: {told}");
+        std::fs::write(at(file), good).unwrap();
+    }
+    let good = std::fs::read(at("texture.npy")).unwrap();
+    let mut not_finite = good.clone();
+    let end = good.len();
+    not_finite[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
+    for (bad, said) in [
+        (good[..end - 100].to_vec(), "cut off"),
+        (b"no array".to_vec(), "texture.npy"),
+        (not_finite, "finite"),
+    ] {
+        std::fs::write(at("texture.npy"), bad).unwrap();
+        let told = open_solid(folder.path()).unwrap_err().to_string();
+        assert!(told.contains(said), "{told}");
+    }
+}

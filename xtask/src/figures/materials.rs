@@ -1,6 +1,5 @@
 //! Figure 12: photographs of three materials, and what is carved from the solids made of them.
 
-use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -18,6 +17,7 @@ use stereology::sample;
 use stereology::shape::{PeriodicBox, TriangleMesh};
 use stereology::volume::{Axis, SlicePlane, Solid, turned};
 
+use super::carvings;
 use super::solids::{row, sample_types};
 use crate::sample::photograph;
 
@@ -66,30 +66,38 @@ const FOAM: Material = Material {
     void: true,
 };
 
+/// A photograph, and the solid made of it.
+pub struct Made {
+    pub photo: RgbImage,
+    pub solid: Solid,
+}
+
+pub fn terrazzo() -> Result<Made> {
+    made(sample::photo()?, &sample_types()?, false)
+}
+
+pub fn asphalt() -> Result<Made> {
+    ASPHALT.made()
+}
+
+pub fn foam() -> Result<Made> {
+    FOAM.made()
+}
+
+fn made(photo: RgbImage, types: &ParticleTypes, void: bool) -> Result<Made> {
+    let options = SynthesisOptions {
+        voids: if void { vec![0] } else { Vec::new() },
+        extent: Extent::Count(3000),
+        ..SynthesisOptions::default()
+    };
+    let solid = synthesize(&photo, None, types, &options, &|_, _| ControlFlow::Continue(()))?.solid;
+    Ok(Made { photo, solid })
+}
+
 /// Each row: the photograph, a block of the solid, a vase carved from it.
 pub fn draw(folder: &Path) -> Result<()> {
-    for (name, photo, types, void) in [
-        ("terrazzo", sample::photo()?, sample_types()?, false),
-        (
-            "asphalt",
-            ASPHALT.photograph()?,
-            ParticleTypes::parse(&[ASPHALT.shape])?,
-            ASPHALT.void,
-        ),
-        (
-            "foam",
-            FOAM.photograph()?,
-            ParticleTypes::parse(&[FOAM.shape])?,
-            FOAM.void,
-        ),
-    ] {
-        let options = SynthesisOptions {
-            voids: if void { vec![0] } else { Vec::new() },
-            extent: Extent::Count(3000),
-            ..SynthesisOptions::default()
-        };
-        let made = synthesize(&photo, None, &types, &options, &|_, _| ControlFlow::Continue(()))?;
-        let part = crop_imm(&photo, 100, 100, SIDE, SIDE).to_image();
+    for (name, made) in [("terrazzo", terrazzo()?), ("asphalt", asphalt()?), ("foam", foam()?)] {
+        let part = crop_imm(&made.photo, 100, 100, SIDE, SIDE).to_image();
         row(&[part, block(&made.solid)?, vase(&made.solid)?])
             .save(folder.join(format!("figure-12-{name}.png")))
             .context("figure 12 cannot be written")?;
@@ -98,6 +106,10 @@ pub fn draw(folder: &Path) -> Result<()> {
 }
 
 impl Material {
+    fn made(&self) -> Result<Made> {
+        made(self.photograph()?, &ParticleTypes::parse(&[self.shape])?, self.void)
+    }
+
     /// A section of a packing of such particles, as a camera sees it.
     fn photograph(&self) -> Result<RgbImage> {
         let types = ParticleTypes::parse(&[self.shape])?;
@@ -149,55 +161,8 @@ fn vase(solid: &Solid) -> Result<RgbImage> {
         ..Camera::default()
     };
     let options = RenderOptions::default().with_size(SIDE, SIDE).with_samples(4);
-    let mesh = turned_vase(520.0);
+    let mesh = carvings::vase(520.0);
     Ok(picture_of_solid(solid, &mesh, &turned, &camera, &options, &|_| {
         ControlFlow::Continue(())
     })?)
-}
-
-/// A vase of this height, open at the top: its outline, outer side up and inner side down, about the z axis.
-fn turned_vase(height: f64) -> TriangleMesh {
-    const AROUND: u32 = 160;
-    const ALONG: u32 = 120;
-    // Foot, belly, neck and lip.
-    let outside = |t: f64| 0.20 + 0.13 * (TAU * (0.75 * t + 0.02)).sin() + 0.05 * t * t * t + 0.02 * (1.0 - t);
-    let wall = 0.035;
-    let outline: Vec<[f64; 2]> = (0..=ALONG)
-        .map(|i| f64::from(i) / f64::from(ALONG))
-        .map(|t| [outside(t), t])
-        .chain((0..=ALONG).map(|i| 1.0 - f64::from(i) / f64::from(ALONG)).map(|t| {
-            let inner = (outside(t) - wall).max(0.01);
-            [inner, wall + (1.0 - wall) * t]
-        }))
-        .collect();
-    let rings = outline.len() as u32;
-    let mut mesh = TriangleMesh {
-        vertices: Vec::new(),
-        triangles: Vec::new(),
-    };
-    for [radius, z] in outline {
-        for k in 0..AROUND {
-            let angle = TAU * f64::from(k) / f64::from(AROUND);
-            let p = Point3::new(radius * angle.cos(), radius * angle.sin(), z);
-            mesh.vertices.push(p * height);
-        }
-    }
-    for ring in 0..rings - 1 {
-        for k in 0..AROUND {
-            let (a, b) = (ring * AROUND + k, ring * AROUND + (k + 1) % AROUND);
-            mesh.triangles.push([a, b, a + AROUND]);
-            mesh.triangles.push([b, b + AROUND, a + AROUND]);
-        }
-    }
-    // The bottom, below and inside.
-    for (ring, out) in [(0, true), (rings - 1, false)] {
-        let centre = mesh.vertices.len() as u32;
-        let z = mesh.vertices[(ring * AROUND) as usize].z;
-        mesh.vertices.push(Point3::new(0.0, 0.0, z));
-        for k in 0..AROUND {
-            let (a, b) = (ring * AROUND + k, ring * AROUND + (k + 1) % AROUND);
-            mesh.triangles.push(if out { [centre, b, a] } else { [centre, a, b] });
-        }
-    }
-    mesh
 }

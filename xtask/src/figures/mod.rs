@@ -1,6 +1,8 @@
 //! The paper's figures, drawn again from this workspace: pictures and tables under docs/figures.
 
 mod bars;
+mod carvings;
+mod controlled;
 mod density_recovery;
 mod estimators;
 mod grain_size_tools;
@@ -8,6 +10,7 @@ mod growing;
 mod materials;
 mod packings;
 mod particles;
+mod scenes;
 mod section_likelihood;
 mod solids;
 mod sphere_samples;
@@ -21,12 +24,13 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 17] = [
+    let figures: [(&str, Figure); 20] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
         ("figure-04-section-likelihood", section_likelihood::draw),
-        ("figure-05-10-solid", solids::draw_blocks),
+        ("figure-01-scene", scenes::draw_still_life),
+        ("figure-05-solid", solids::draw_blocks),
         ("figure-06-residual", solids::draw_residual),
         ("figure-07-density-recovery", density_recovery::draw),
         ("figure-08-recovered-volume", density_recovery::draw_volumes),
@@ -34,6 +38,8 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("unfolding-coverage", estimators::draw_coverage),
         ("unfolding-speed", estimators::draw_speed),
         ("figure-09-particles", particles::draw_shapes),
+        ("figure-10-controlled", controlled::draw),
+        ("figure-11-scene", scenes::draw_sculpture),
         ("figure-12-materials", materials::draw),
         ("packing", packings::draw),
         ("texture", textures::draw),

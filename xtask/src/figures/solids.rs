@@ -1,4 +1,4 @@
-//! Figures 5, 6 and 10: a block of the sample's solid in mean colours, with its residual, and by Heeger and Bergen's method alone.
+//! Figures 5 and 6: a block of the sample's solid in mean colours and with its residual.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -7,9 +7,7 @@ use anyhow::{Context, Result};
 use image::RgbImage;
 use image::imageops::{crop_imm, replace};
 use nalgebra::Vector3;
-use ndarray::{Array3, Array4};
 use stereology::pipeline::{ParticleTypes, Synthesis, SynthesisOptions, synthesize};
-use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
 use stereology::render::{BlockOptions, RenderOptions, render_block};
 use stereology::sample;
 use stereology::shape::Body;
@@ -35,7 +33,7 @@ fn solid() -> Result<Synthesis> {
     )?)
 }
 
-/// Blocks: mean colours (5 a, 10 d), with the residual (5 b, 10 c), and the photograph itself synthesised in 3D (10 e).
+/// Blocks: mean colours (a), with the residual (b).
 pub fn draw_blocks(folder: &Path) -> Result<()> {
     let made = solid()?;
     let sides = Vector3::repeat(256.0);
@@ -45,24 +43,7 @@ pub fn draw_blocks(folder: &Path) -> Result<()> {
     let plain = made.solid.without_residual();
     block(&|p| plain.colour_at(p))?.save(folder.join("figure-05a-mean-colours.png"))?;
     block(&|p| made.solid.colour_at(p))?.save(folder.join("figure-05b-with-residual.png"))?;
-
-    let photo = sample::photo()?;
-    let exemplar = Array3::from_shape_fn(
-        (photo.height() as usize, photo.width() as usize, 3),
-        |(y, x, channel)| f32::from(photo.get_pixel(x as u32, y as u32).0[channel]) / 255.0,
-    );
-    let options = TextureOptions::default().with_mode(Mode::Volume);
-    let texture = synthesize_volume(&Exemplar::new(exemplar.view()), [128; 3], &options, &|_| {
-        ControlFlow::Continue(())
-    })?;
-    block(&|p| voxel(&texture, p))?.save(folder.join("figure-10e-heeger-bergen-alone.png"))?;
     Ok(())
-}
-
-fn voxel(texture: &Array4<f32>, p: &nalgebra::Point3<f64>) -> [f32; 3] {
-    let (nz, ny, nx, _) = texture.dim();
-    let index = |x: f64, n: usize| (x.max(0.0) as usize) % n;
-    [0, 1, 2].map(|channel| texture[[index(p.z, nz), index(p.y, ny), index(p.x, nx), channel]].clamp(0.0, 1.0))
 }
 
 /// The picture of README: the sample, a section of its solid at the same scale, a block of it.

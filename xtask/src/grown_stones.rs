@@ -25,10 +25,7 @@ pub fn grow(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<
     for (mesh, exemplar, resolution, window) in [
         ("spot", "gravel_256", 48, 5),
         ("spot", "gravel_256", 128, 5),
-        ("spot", "binary_carbonate_256", 128, 7),
-        ("armadillo", "gravel_256", 128, 5),
-        ("armadillo", "binary_sandstone_256", 128, 5),
-        ("armadillo", "gravel_256", 128, 9),
+        ("armadillo", "gravel_256", 96, 5),
     ] {
         for measured in [0, 40] {
             let path = data.join(format!("meshes/{mesh}.obj"));

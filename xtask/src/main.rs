@@ -3,6 +3,7 @@
 mod acceptance;
 mod bench_report;
 mod figures;
+mod grown_stones;
 mod label_scores;
 mod particle_noise;
 mod renderer_check;
@@ -38,7 +39,7 @@ enum Task {
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
-        /// Only this part: photographs, textures, noise or renderer
+        /// Only this part: photographs, textures, noise, renderer, grow or measure
         #[arg(long)]
         only: Option<String>,
         /// Python that has mitsuba, against which the renderer is held; without it that part is left out
@@ -91,6 +92,16 @@ fn main() -> Result<()> {
             }
             if wanted("noise") {
                 particle_noise::run(&data.join("images"), &page)?;
+            }
+            if wanted("grow") || wanted("measure") {
+                let program = root()?.join("target/release/stereology");
+                let program = std::env::var_os("STEREOLOGY").map_or(program, PathBuf::from);
+                if wanted("grow") {
+                    grown_stones::grow(&program, &data, &results, &root()?.join("docs/grow.md"))?;
+                }
+                if wanted("measure") {
+                    grown_stones::measure(&program, &data, &results, &root()?.join("docs/measure.md"))?;
+                }
             }
             if let Some(python) = python.filter(|_| wanted("renderer")) {
                 renderer_check::run(&python, &results.join("renderer"))?;

@@ -149,7 +149,14 @@ pub(super) fn distribution(values: &[Vec<f64>; 2], x_name: &str) -> String {
     let points = [0, 1].map(|k| {
         let n = values[k].len() as f64;
         let shares = (0..values[k].len()).map(|i| (i + 1) as f64 / n);
-        values[k].iter().copied().zip(shares).collect::<Vec<_>>()
+        // The longest in a hundred would press the others together.
+        let most = |(_, share): &(f64, f64)| *share <= 0.99;
+        values[k]
+            .iter()
+            .copied()
+            .zip(shares)
+            .take_while(most)
+            .collect::<Vec<_>>()
     });
     beside(points, x_name, "share")
 }
@@ -167,14 +174,15 @@ pub(super) fn slices(values: &[Vec<f64>; 2], x_name: &str, y_name: &str) -> Stri
 }
 
 fn beside(points: [Vec<(f64, f64)>; 2], x_name: &str, y_name: &str) -> String {
+    let all = || points.iter().flatten().copied();
+    let (left, right) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
+    if left >= right {
+        return "<p>There is nothing to show.</p>".to_owned();
+    }
     drawn(&BESIDE, |area| {
-        let all = || points.iter().flatten().copied();
-        let (left, right) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
-        if left >= right {
-            return Err("there is nothing to show".into());
-        }
         let lowest = all().map(|p| p.1).fold(0.0, f64::min);
-        let top = highest(all().map(|p| p.1));
+        let is_below = lowest < 0.0 && all().all(|p| p.1 <= 0.0);
+        let top = if is_below { 0.0 } else { highest(all().map(|p| p.1)) };
         let mut chart = axes(area, left..right, 1.08 * lowest..top, x_name, y_name)?;
         for (points, (colour, _)) in points.iter().zip(BESIDE) {
             chart.draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?;
@@ -250,7 +258,8 @@ fn decade(value: f64) -> String {
 }
 
 fn tick(value: f64) -> String {
-    if value == 0.0 {
+    // Marks are computed by steps, and zero may be missed by rounding.
+    if value.abs() < 1e-12 {
         "0".to_owned()
     } else if value.abs() >= 1e5 || value.abs() < 1e-3 {
         format!("{value:.1e}")

@@ -7,6 +7,7 @@ mod contract;
 mod packings;
 mod small_commands;
 mod solid;
+mod stones;
 mod unfolding;
 
 use std::path::Path;

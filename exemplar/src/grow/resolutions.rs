@@ -208,7 +208,8 @@ fn one_level(
             known.iter_mut().for_each(|k| k.weight /= total);
             beside.sort_unstable();
             beside.dedup();
-            tree.like(&known, &beside, options.search, options.tolerance, &mut found);
+            let salt = rng.random::<u32>();
+            tree.like(&known, &beside, options.search, options.tolerance, salt, &mut found);
             let texel = found[pick(rng.random::<f32>(), found.len())].1;
             sources[[y, x]] = texel;
             copy(&mut made, y, x, texel);

@@ -1,4 +1,5 @@
 //! Volumes of other programs: any sample type, byte order, order of axes; damaged ones are refused.
+#![allow(clippy::cast_possible_truncation, clippy::float_cmp, reason = "values of a test")]
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -70,7 +71,7 @@ fn npy(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 fn every_type_and_order_of_numpy_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("v.npy");
-    let mut read = |bytes: Vec<u8>| {
+    let read = |bytes: Vec<u8>| {
         fs::write(&file, bytes).unwrap();
         read_volume(&file).unwrap()
     };

@@ -6,6 +6,7 @@ mod controlled;
 mod density_recovery;
 mod estimators;
 mod grain_size_tools;
+mod growing;
 mod materials;
 mod packings;
 mod particles;
@@ -23,7 +24,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 19] = [
+    let figures: [(&str, Figure); 20] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -42,6 +43,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("figure-12-materials", materials::draw),
         ("packing", packings::draw),
         ("texture", textures::draw),
+        ("grow", growing::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

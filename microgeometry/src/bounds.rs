@@ -88,10 +88,6 @@ impl<'a> Region<'a> {
         }
     }
 
-    pub(crate) fn is_forced(&self, t: u32) -> bool {
-        self.counted[t as usize] > 0
-    }
-
     /// Labels the triangles `seeds` with `value` and spreads that as far as bounds above `floor` go. Nothing happens and [`Overfull`] is told if that forced more into a level than `limit` lets.
     pub(crate) fn spread(
         &mut self,

@@ -1,6 +1,7 @@
 //! From a contact distribution to a signed distance for every triangle of a mesh.
 
 use std::ops::ControlFlow;
+use std::str::FromStr;
 
 use stereology_shape::TriangleMesh;
 
@@ -20,6 +21,29 @@ pub enum Method {
     Tight,
     /// Section 4.4 of the paper to the letter: triangles that share an edge are neighbours, every triangle counts one, leftovers take the average of their neighbours. 5 to 12 % are left over where triangles are as large as bins, half of all on fine meshes.
     Paper,
+}
+
+impl Method {
+    /// `tight` or `paper`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tight => "tight",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+impl FromStr for Method {
+    type Err = MicrogeometryError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "tight" => Ok(Self::Tight),
+            "paper" => Ok(Self::Paper),
+            _ => Err(MicrogeometryError::Parameter(format!("{text:?} is no method: tight or paper"))),
+        }
+    }
 }
 
 /// What a triangle counts for in the histogram.

@@ -1,6 +1,9 @@
 //! The commands, one module each.
 
 pub mod carve;
+pub mod contact;
+pub mod displace;
+pub mod explore;
 pub mod export;
 pub mod kmatrix;
 pub mod pack;
@@ -57,12 +60,9 @@ pub enum Command {
     Exemplar(Later),
     /// Not available yet: stone grown around measured particles
     Grow(Later),
-    /// Not available yet: contact distributions of a microgeometry
-    Contact(Later),
-    /// Not available yet: stochastic displacement of a mesh
-    Displace(Later),
-    /// Not available yet: a solid explored interactively
-    Explore(Later),
+    Contact(contact::Contact),
+    Displace(displace::Displace),
+    Explore(explore::Explore),
     /// Prints docs/cli.md
     #[command(hide = true)]
     Manual,
@@ -98,9 +98,9 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Measure(rest) => later("measure", rest),
         Command::Exemplar(rest) => later("exemplar", rest),
         Command::Grow(rest) => later("grow", rest),
-        Command::Contact(rest) => later("contact", rest),
-        Command::Displace(rest) => later("displace", rest),
-        Command::Explore(rest) => later("explore", rest),
+        Command::Contact(options) => options.run(everywhere).map(Some),
+        Command::Displace(options) => options.run(everywhere).map(Some),
+        Command::Explore(options) => options.run(everywhere).map(Some),
         Command::Manual => {
             use std::io::Write;
             let _ = std::io::stdout().write_all(manual::page().as_bytes());

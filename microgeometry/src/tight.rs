@@ -21,6 +21,9 @@ const REFUSALS: u32 = 32;
 /// How often the candidates are put in order again.
 const ROUNDS: u32 = 16;
 
+/// So many of the candidates nearest to their region are tried where others were refused.
+const NEAREST: usize = 4096;
+
 /// Seeds are tried in order of slack + APART × distance to the own region + CHANCE × a random share of a bin, both distances up to REACH bins.
 ///
 /// Of random fields on four meshes, APART 0 leaves the distances measured afterwards .26 to .5 bins off, .4 .2 to .35; a reach of 6 bins makes one large clump (1 to 6 bins off). CHANCE between .1 and 1 does not matter to them.
@@ -144,7 +147,7 @@ impl Tight<'_> {
     ) {
         let value = level as f64 * self.height;
         let turn = ((2 * level + side) as f64 * 0.618_033_988_749_894_9).fract() as f32;
-        let mut candidates: Vec<(f32, u32)> = Vec::new();
+        let mut candidates: Vec<u64> = Vec::new();
         for &t in open {
             let i = t as usize;
             if state.labelled[i] || state.regions[side].bound[i] > value {
@@ -156,7 +159,7 @@ impl Tight<'_> {
             if slack >= 0.0 {
                 let chance = f64::from((dice[i] + turn).fract());
                 let cost = slack.min(REACH * self.bin) + APART * apart.min(REACH * self.bin) + CHANCE * self.bin * chance;
-                candidates.push((cost as f32, t));
+                candidates.push(key(cost, t));
             }
         }
         let mut patience = PATIENCE * open.len() as u64;
@@ -164,14 +167,19 @@ impl Tight<'_> {
         self.place(state, side, level, room, &mut candidates, &Pass { batch, refusals: u32::MAX, hand_down: false }, &mut patience);
         // First within the room of every level; then what would be handed down anyway may already be used below.
         for hand_down in [false, true] {
-            for _ in 0..ROUNDS {
+            for round in 0..ROUNDS {
                 if room[side][level] <= 0 {
                     return;
                 }
-                candidates.retain(|&(_, t)| !state.labelled[t as usize]);
-                for (key, t) in &mut candidates {
-                    let apart = value - state.regions[side].bound[*t as usize];
-                    *key = (apart + 1e-3 * self.bin * f64::from((dice[*t as usize] + turn).fract())) as f32;
+                candidates.retain(|&candidate| !state.labelled[triangle(candidate) as usize]);
+                for candidate in &mut candidates {
+                    let t = triangle(*candidate);
+                    let apart = value - state.regions[side].bound[t as usize];
+                    *candidate = key(apart + 1e-3 * self.bin * f64::from((dice[t as usize] + turn).fract()), t);
+                }
+                if round == 0 && !hand_down && candidates.len() > NEAREST {
+                    candidates.select_nth_unstable(NEAREST);
+                    candidates.truncate(NEAREST);
                 }
                 let mut patience = PATIENCE * open.len() as u64;
                 let pass = Pass { batch: 1, refusals: REFUSALS, hand_down };
@@ -190,7 +198,7 @@ impl Tight<'_> {
         side: usize,
         level: usize,
         room: &mut [Levels; 2],
-        candidates: &mut [(f32, u32)],
+        candidates: &mut [u64],
         pass: &Pass,
         patience: &mut u64,
     ) -> bool {
@@ -207,7 +215,7 @@ impl Tight<'_> {
                 if next == sorted {
                     sorted = sort_some(candidates, sorted);
                 }
-                let t = candidates[next].1;
+                let t = triangle(candidates[next]);
                 let of = self.weights[t as usize];
                 next += 1;
                 // What is too large for the room is passed over.
@@ -331,14 +339,22 @@ pub(crate) fn signed(side: usize, value: f64) -> f64 {
     if side == 1 { value } else { -value }
 }
 
+/// A candidate: its cost, which is not negative, before its number, so that whole numbers sort as both do.
+fn key(cost: f64, t: u32) -> u64 {
+    u64::from((cost as f32).to_bits()) << 32 | u64::from(t)
+}
+
+fn triangle(candidate: u64) -> u32 {
+    candidate as u32
+}
+
 /// Sorts the next candidates behind the first `sorted`; returns how many are sorted now.
-fn sort_some(candidates: &mut [(f32, u32)], sorted: usize) -> usize {
+fn sort_some(candidates: &mut [u64], sorted: usize) -> usize {
     let rest = &mut candidates[sorted..];
     let some = rest.len().min(1024.max(sorted));
-    let compare = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     if some < rest.len() {
-        rest.select_nth_unstable_by(some, compare);
+        rest.select_nth_unstable(some);
     }
-    rest[..some].sort_unstable_by(compare);
+    rest[..some].sort_unstable();
     sorted + some
 }

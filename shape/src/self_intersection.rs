@@ -98,6 +98,10 @@ fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: 
 /// On which side of the plane of `plane` each corner lies: 1 where its normal points, -1, or 0; exact.
 fn sides(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3]) -> [i8; 3] {
     corners.map(|p| {
+        // A shared corner is the common case, and the slowest for the predicate.
+        if plane.contains(&p) {
+            return 0;
+        }
         sign(-orient3d(
             coord(&plane[0]),
             coord(&plane[1]),

@@ -5,6 +5,7 @@ mod bench_report;
 mod figures;
 mod label_scores;
 mod particle_noise;
+mod relief_table;
 mod renderer_check;
 mod sample;
 mod sand;
@@ -30,15 +31,15 @@ enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
     /// Runs the released program on photographs outside the project and writes docs/acceptance.md, and synthesises textures
-    /// outside the project and writes the table of docs/texture.md
+    /// outside the project and writes the table of docs/texture.md; likewise reliefs and docs/microgeometry.md
     Acceptance {
-        /// Folder that holds images/ and textures/
+        /// Folder that holds images/, textures/, meshes/ and exemplars/
         #[arg(long)]
         data: PathBuf,
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
-        /// Only this part: photographs, textures, noise or renderer
+        /// Only this part: photographs, textures, noise, reliefs or renderer
         #[arg(long)]
         only: Option<String>,
         /// Python that has mitsuba, against which the renderer is held; without it that part is left out
@@ -88,6 +89,11 @@ fn main() -> Result<()> {
             }
             if wanted("noise") {
                 particle_noise::run(&data.join("images"), &page)?;
+            }
+            if wanted("reliefs") {
+                let program = root()?.join("target/release/stereology");
+                let page = root()?.join("docs/microgeometry.md");
+                relief_table::run(&program, &data, &results.join("reliefs"), &page)?;
             }
             if let Some(python) = python.filter(|_| wanted("renderer")) {
                 renderer_check::run(&python, &results.join("renderer"))?;

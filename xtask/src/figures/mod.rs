@@ -1,4 +1,4 @@
-//! The paper's figures, drawn again from this workspace: pictures and tables under docs/figures.
+//! The papers' figures, drawn again from this workspace: pictures and tables under docs/figures.
 
 mod bars;
 mod carvings;
@@ -9,6 +9,7 @@ mod grain_size_tools;
 mod materials;
 mod packings;
 mod particles;
+mod reliefs;
 mod scenes;
 mod section_likelihood;
 mod solids;
@@ -23,7 +24,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 19] = [
+    let figures: [(&str, Figure); 20] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -42,6 +43,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("figure-12-materials", materials::draw),
         ("packing", packings::draw),
         ("texture", textures::draw),
+        ("microgeometry", reliefs::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

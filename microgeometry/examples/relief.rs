@@ -21,7 +21,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let contact = contact_of_picture(picture.view(), &EstimateOptions::default())?;
     let ball = TriangleMesh::icosphere(2.0, 5);
     let scaled = to_distribution_units(&ball, 60.0)?;
-    let made = reconstruct(&scaled, &contact, &ReconstructOptions::default(), &|_| ControlFlow::Continue(()))?;
+    let made = reconstruct(&scaled, &contact, &ReconstructOptions::default(), &|_| {
+        ControlFlow::Continue(())
+    })?;
     println!(
         "{} triangles, {:.2} % left over, {} violations; labels {:.3} bins from the picture's distances, measured again {:.2}",
         made.labels.len(),

@@ -1,5 +1,8 @@
 //! What the labels given so far allow the other triangles: lower and upper bounds, spread over the surface as far as they matter.
-#![allow(clippy::cast_possible_truncation, reason = "triangles and levels are numbered in 32 bits")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "triangles and levels are numbered in 32 bits"
+)]
 
 use std::collections::BinaryHeap;
 
@@ -172,7 +175,12 @@ impl<'a> Region<'a> {
     }
 
     fn take_back(&mut self) {
-        while let Some(Change { triangle, counted, bound }) = self.undo.pop() {
+        while let Some(Change {
+            triangle,
+            counted,
+            bound,
+        }) = self.undo.pop()
+        {
             let t = triangle as usize;
             let now = self.counted[t];
             if now != counted {

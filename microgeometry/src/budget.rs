@@ -1,4 +1,5 @@
 //! How much of the mesh each interval of distances gets: the histogram in whole numbers (section 4.3 and figure 9).
+#![allow(clippy::cast_possible_truncation, reason = "shares of a total that is whole")]
 
 use crate::contact::ContactDistribution;
 

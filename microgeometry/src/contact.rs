@@ -1,4 +1,5 @@
 //! How far the points of two regions lie from the interface between them: a histogram with a sign.
+#![allow(clippy::cast_possible_truncation, reason = "bins are checked against their largest number before")]
 
 use serde::{Deserialize, Serialize};
 
@@ -110,7 +111,7 @@ impl ContactDistribution {
         let (mut negative, mut positive) = (Vec::new(), Vec::new());
         for (distance, weight) in distances {
             let bin = (distance.abs() / bin_width).floor();
-            if !(bin < MOST_BINS as f64) {
+            if bin.is_nan() || bin >= MOST_BINS as f64 {
                 let (bins, most) = (bin.min(1e15) as usize, MOST_BINS);
                 return Err(MicrogeometryError::TooManyBins { bins, most });
             }
@@ -197,7 +198,11 @@ impl ContactDistribution {
     /// ```
     pub fn edited(&self, bin: i64, share: f64) -> Result<Self, MicrogeometryError> {
         let (mut negative, mut positive) = (self.negative.clone(), self.positive.clone());
-        let (side, bin) = if bin < 0 { (&mut negative, -(bin + 1)) } else { (&mut positive, bin) };
+        let (side, bin) = if bin < 0 {
+            (&mut negative, -(bin + 1))
+        } else {
+            (&mut positive, bin)
+        };
         let bin = usize::try_from(bin).unwrap_or(usize::MAX);
         if bin >= MOST_BINS {
             let (bins, most) = (bin, MOST_BINS);
@@ -221,7 +226,9 @@ impl ContactDistribution {
         }
         let mix = |a: &[f64], b: &[f64]| -> Vec<f64> {
             let at = |of: &[f64], k: usize| of.get(k).copied().unwrap_or_default();
-            (0..a.len().max(b.len())).map(|k| (1.0 - t) * at(a, k) + t * at(b, k)).collect()
+            (0..a.len().max(b.len()))
+                .map(|k| (1.0 - t) * at(a, k) + t * at(b, k))
+                .collect()
         };
         Self::new(
             self.bin_width,
@@ -267,6 +274,7 @@ impl ContactDistribution {
 
     /// The file's text.
     #[must_use]
+    #[allow(clippy::missing_panics_doc, reason = "a structure of numbers and strings can always be written")]
     pub fn to_json(&self) -> String {
         let written = Written {
             schema: SCHEMA.to_owned(),

@@ -97,6 +97,7 @@ impl Design {
     /// # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
     /// ```
     #[must_use]
+    #[allow(clippy::missing_panics_doc, reason = "a structure of numbers and strings can always be written")]
     pub fn to_json(&self) -> String {
         let offset = |of: &Offset| WrittenOffset {
             direction: of.direction.name().to_owned(),
@@ -136,7 +137,10 @@ impl Design {
             let direction: Direction = of.direction.parse()?;
             let profile: Profile = of.profile.parse()?;
             if !(of.scale.is_finite() && of.scale >= 0.0) {
-                return Err(MicrogeometryError::Parameter(format!("no scale of an offset: {}", of.scale)));
+                return Err(MicrogeometryError::Parameter(format!(
+                    "no scale of an offset: {}",
+                    of.scale
+                )));
             }
             Ok(Offset {
                 direction,

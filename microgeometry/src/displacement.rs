@@ -77,7 +77,13 @@ impl FromStr for Profile {
         let mut points: Vec<[f64; 2]> = Vec::new();
         for point in text.split(';') {
             let (x, f) = point.split_once('=').ok_or_else(wrong)?;
-            let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(wrong);
+            let number = |word: &str| {
+                word.trim()
+                    .parse()
+                    .ok()
+                    .filter(|x: &f64| x.is_finite())
+                    .ok_or_else(wrong)
+            };
             let (x, f) = (number(x)?, number(f)?);
             if points.last().map_or(x < 0.0, |last| x <= last[0]) {
                 return Err(wrong());

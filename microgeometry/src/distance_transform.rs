@@ -89,6 +89,7 @@ impl Envelope {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "squares of whole numbers are exact")]
 mod tests {
     use super::distance_to_other_region;
     use ndarray::Array3;

@@ -1,5 +1,8 @@
 //! Distances over a mesh: the graph whose nodes are the triangles' centroids.
-#![allow(clippy::cast_possible_truncation, reason = "meshes number their triangles in 32 bits")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "meshes number their triangles in 32 bits"
+)]
 
 use std::collections::BinaryHeap;
 
@@ -112,8 +115,8 @@ pub(crate) struct Link {
 
 /// More steps than this do not fit into memory: 4 GB.
 const MOST_LINKS: usize = 1 << 28;
-/// Coordinates beyond this have squares that are no numbers.
-const LARGEST: f64 = 1e100;
+/// Coordinates are below this, so that squares of areas are numbers.
+const LARGEST: f64 = 1e60;
 /// Triangles a task.
 const BLOCK: usize = 8192;
 
@@ -142,7 +145,7 @@ impl DualGraph {
                 0.5 * (b - a).cross(&(c - a)).norm()
             })
             .collect();
-        if !(areas.iter().sum::<f64>() > 0.0) {
+        if areas.iter().sum::<f64>() <= 0.0 {
             return Err(MicrogeometryError::NoArea);
         }
         let around = Around::new(mesh);

@@ -49,7 +49,7 @@ pub enum MicrogeometryError {
         vertices: usize,
     },
     /// A coordinate that is no finite number.
-    #[error("vertex {vertex} is not finite (or beyond 1e100)")]
+    #[error("vertex {vertex} is not finite (or beyond 1e60)")]
     NotFinite {
         /// Index of the vertex.
         vertex: usize,
@@ -58,13 +58,17 @@ pub enum MicrogeometryError {
     #[error("the mesh has no area: all its triangles are points or lines")]
     NoArea,
     /// Vertices with very many triangles.
-    #[error("a vertex has {most} triangles: their distances to each other do not fit into memory; remesh the mesh there")]
+    #[error(
+        "a vertex has {most} triangles: their distances to each other do not fit into memory; remesh the mesh there"
+    )]
     Crowded {
         /// Triangles about the vertex with most.
         most: usize,
     },
     /// No metric.
-    #[error("the metric must be symmetric and positive definite: an axis that is a direction, and a stretch above zero")]
+    #[error(
+        "the metric must be symmetric and positive definite: an axis that is a direction, and a stretch above zero"
+    )]
     Metric,
     /// A parameter outside its range.
     #[error("{0}")]

@@ -1,4 +1,5 @@
 //! Contact distributions measured on pictures and volumes (section 5.3 and figure 8 of the paper).
+#![allow(clippy::cast_possible_truncation, reason = "distances in pixels of a picture in memory")]
 
 use ndarray::{ArrayView2, ArrayView3, Axis};
 
@@ -167,7 +168,7 @@ fn estimate(
             _ => of.lose(border),
         }
     }
-    let [negative, positive] = lives.map(|life| life.shares());
+    let [negative, positive] = lives.map(LifeTable::shares);
     ContactDistribution::new(width * pixel_size, negative, positive)
 }
 

@@ -165,8 +165,13 @@ impl Exploration {
     }
 
     fn offset(&self, random: &mut ChaCha8Rng) -> Offset {
-        let direction = [Direction::Out, Direction::Out, Direction::In, Direction::In, Direction::Still]
-            [random.random_range(0..5)];
+        let direction = [
+            Direction::Out,
+            Direction::Out,
+            Direction::In,
+            Direction::In,
+            Direction::Still,
+        ][random.random_range(0..5)];
         let scale = log_even(random, self.scales);
         let (profile, scale) = if random.random::<f64>() < 0.6 {
             (Profile::Root, scale)

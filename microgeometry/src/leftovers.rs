@@ -30,7 +30,11 @@ pub(crate) fn average(graph: &DualGraph, labelled: &[bool], labels: &mut [f64]) 
     let open: Vec<usize> = (0..graph.len()).filter(|&t| !labelled[t]).collect();
     for &t in &open {
         // Pieces without any label have no bounds.
-        labels[t] = if low[t].is_finite() { 0.5 * (low[t] + high[t]) } else { 0.0 };
+        labels[t] = if low[t].is_finite() {
+            0.5 * (low[t] + high[t])
+        } else {
+            0.0
+        };
     }
     for _ in 0..ROUNDS {
         for &t in &open {

@@ -65,7 +65,9 @@ impl Paper<'_> {
                     regions[side].bound[i] <= value && -regions[1 - side].bound[i] >= value
                 };
                 let mut eligible: Vec<u32> = open.iter().copied().filter(may).collect();
-                let wanted = usize::try_from(room[side][level].max(0) / self.unit).unwrap_or(0).min(eligible.len());
+                let wanted = usize::try_from(room[side][level].max(0) / self.unit)
+                    .unwrap_or(0)
+                    .min(eligible.len());
                 let (seeds, _) = eligible.partial_shuffle(&mut random, wanted);
                 // Labels of one bin and sign do not bind each other, so they are given at once.
                 let _ = regions[side].spread(seeds, value, -value - self.bin, &mut labelled, &limit);

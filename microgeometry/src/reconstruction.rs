@@ -41,7 +41,9 @@ impl FromStr for Method {
         match text {
             "tight" => Ok(Self::Tight),
             "paper" => Ok(Self::Paper),
-            _ => Err(MicrogeometryError::Parameter(format!("{text:?} is no method: tight or paper"))),
+            _ => Err(MicrogeometryError::Parameter(format!(
+                "{text:?} is no method: tight or paper"
+            ))),
         }
     }
 }
@@ -242,10 +244,7 @@ fn describe(
     };
     let mut shortfalls = Vec::new();
     let mut misplaced = 0.0;
-    for (sign, wanted, got) in [
-        (-1, of.negative(), got.negative()),
-        (1, of.positive(), got.positive()),
-    ] {
+    for (sign, wanted, got) in [(-1, of.negative(), got.negative()), (1, of.positive(), got.positive())] {
         for k in (0..wanted.len().max(got.len())).rev() {
             let at = |of: &[f64]| of.get(k).copied().unwrap_or_default();
             let (wanted, got) = (at(wanted), at(got));
@@ -293,7 +292,7 @@ pub fn to_distribution_units(mesh: &TriangleMesh, units: f64) -> Result<Triangle
 
 /// Longest side of the box around the mesh's triangles.
 pub(crate) fn longest_side(mesh: &TriangleMesh) -> Result<f64, MicrogeometryError> {
-    if let Some(vertex) = mesh.vertices.iter().position(|p| !p.iter().all(|x| x.abs() < 1e100)) {
+    if let Some(vertex) = mesh.vertices.iter().position(|p| !p.iter().all(|x| x.abs() < 1e60)) {
         return Err(MicrogeometryError::NotFinite { vertex });
     }
     match mesh.bounding_box() {

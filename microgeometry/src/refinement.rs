@@ -1,5 +1,8 @@
 //! Meshes made fine enough to carry the relief (section 4.4: split triangles until the mesh is fine enough).
-#![allow(clippy::cast_possible_truncation, reason = "more vertices than 32 bits number are refused before")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "more vertices than 32 bits number are refused before"
+)]
 
 use std::f64::consts::TAU;
 
@@ -108,7 +111,11 @@ fn edges(mesh: &TriangleMesh) -> Vec<Edge> {
 /// Splits the edges that `chosen` chooses; with `smooth` vertices move by Loop's rules (1987; borders by Hoppe 1994).
 fn split(mesh: &TriangleMesh, edges: &[Edge], chosen: impl Fn(usize) -> bool, smooth: bool) -> TriangleMesh {
     let at = |v: u32| mesh.vertices[v as usize].coords;
-    let mut vertices = if smooth { smoothed(mesh, edges) } else { mesh.vertices.clone() };
+    let mut vertices = if smooth {
+        smoothed(mesh, edges)
+    } else {
+        mesh.vertices.clone()
+    };
     let mut middles = vec![u32::MAX; edges.len()];
     for (number, edge) in edges.iter().enumerate().filter(|(number, _)| chosen(*number)) {
         let middle = match edge.opposite[..] {
@@ -156,7 +163,11 @@ fn smoothed(mesh: &TriangleMesh, edges: &[Edge]) -> Vec<Point3<f64>> {
     let zero = (Vector3::zeros(), 0_u32);
     let (mut inner, mut border) = (vec![zero; mesh.vertices.len()], vec![zero; mesh.vertices.len()]);
     for edge in edges {
-        let sums = if edge.opposite.len() == 2 { &mut inner } else { &mut border };
+        let sums = if edge.opposite.len() == 2 {
+            &mut inner
+        } else {
+            &mut border
+        };
         for (to, from) in [(edge.from, edge.to), (edge.to, edge.from)] {
             sums[to as usize].0 += mesh.vertices[from as usize].coords;
             sums[to as usize].1 += 1;

@@ -182,7 +182,11 @@ impl Collapse {
         // A point of least error that is far away is a plane's: the middle is as good.
         let trace = sum.a.trace();
         let firm = sum.a.determinant() > 1e-9 * (trace / 3.0).powi(3);
-        if let Some(least) = sum.a.try_inverse().filter(|_| firm).map(|inverse| Point3::from(-(inverse * sum.b)))
+        if let Some(least) = sum
+            .a
+            .try_inverse()
+            .filter(|_| firm)
+            .map(|inverse| Point3::from(-(inverse * sum.b)))
             && (least - middle).norm() <= 2.0 * (q - p).norm()
         {
             places.push(least);
@@ -272,7 +276,13 @@ impl Collapse {
                 return false;
             };
             let normal = |moved: bool| {
-                let [a, b, c] = corners.map(|w| if moved && w == v { *place } else { self.points[w as usize] });
+                let [a, b, c] = corners.map(|w| {
+                    if moved && w == v {
+                        *place
+                    } else {
+                        self.points[w as usize]
+                    }
+                });
                 (b - a).cross(&(c - a))
             };
             let (before, after) = (normal(false), normal(true));

@@ -1,4 +1,5 @@
 //! Contact distributions of eq. (1) with other sets than discs.
+#![allow(clippy::cast_possible_truncation, reason = "distances in pixels of a picture in memory")]
 
 use std::f64::consts::{PI, TAU};
 
@@ -168,12 +169,18 @@ mod tests {
                 // On the lattice |rB| is the number of its pixels, the asked one left out.
                 let r = k as f64 + 1.0;
                 let inside = |dy: i32, dx: i32| set.gauge(f64::from(dx), f64::from(dy)) <= r + 1e-9;
-                let pixels = (-13..=13).flat_map(|dy| (-13..=13).map(move |dx| (dy, dx))).filter(|&(dy, dx)| inside(dy, dx)).count();
+                let pixels = (-13..=13)
+                    .flat_map(|dy| (-13..=13).map(move |dx| (dy, dx)))
+                    .filter(|&(dy, dx)| inside(dy, dx))
+                    .count();
                 let expected = 1.0 - (1.0 - share).powi(pixels as i32 - 1);
                 // Neighbouring pixels see the same points: about one independent answer for each |2rB|.
                 let answers = (n * n) as f64 / (4.0 * pixels as f64);
                 let spread = (expected * (1.0 - expected) / answers).sqrt();
-                assert!((h - expected).abs() < 6.0 * spread + 1e-3, "{set:?} {r}: {h} {expected}");
+                assert!(
+                    (h - expected).abs() < 6.0 * spread + 1e-3,
+                    "{set:?} {r}: {h} {expected}"
+                );
             }
         }
     }

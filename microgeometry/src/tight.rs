@@ -158,13 +158,26 @@ impl Tight<'_> {
             let apart = value - state.regions[side].bound[i];
             if slack >= 0.0 {
                 let chance = f64::from((dice[i] + turn).fract());
-                let cost = slack.min(REACH * self.bin) + APART * apart.min(REACH * self.bin) + CHANCE * self.bin * chance;
+                let cost =
+                    slack.min(REACH * self.bin) + APART * apart.min(REACH * self.bin) + CHANCE * self.bin * chance;
                 candidates.push(key(cost, t));
             }
         }
         let mut patience = PATIENCE * open.len() as u64;
         let batch = room[side][level];
-        self.place(state, side, level, room, &mut candidates, &Pass { batch, refusals: u32::MAX, hand_down: false }, &mut patience);
+        self.place(
+            state,
+            side,
+            level,
+            room,
+            &mut candidates,
+            &Pass {
+                batch,
+                refusals: u32::MAX,
+                hand_down: false,
+            },
+            &mut patience,
+        );
         // First within the room of every level; then what would be handed down anyway may already be used below.
         for hand_down in [false, true] {
             for round in 0..ROUNDS {
@@ -175,14 +188,21 @@ impl Tight<'_> {
                 for candidate in &mut candidates {
                     let t = triangle(*candidate);
                     let apart = value - state.regions[side].bound[t as usize];
-                    *candidate = key(apart + 1e-3 * self.bin * f64::from((dice[t as usize] + turn).fract()), t);
+                    *candidate = key(
+                        apart + 1e-3 * self.bin * f64::from((dice[t as usize] + turn).fract()),
+                        t,
+                    );
                 }
                 if round == 0 && !hand_down && candidates.len() > NEAREST {
                     candidates.select_nth_unstable(NEAREST);
                     candidates.truncate(NEAREST);
                 }
                 let mut patience = PATIENCE * open.len() as u64;
-                let pass = Pass { batch: 1, refusals: REFUSALS, hand_down };
+                let pass = Pass {
+                    batch: 1,
+                    refusals: REFUSALS,
+                    hand_down,
+                };
                 if !self.place(state, side, level, room, &mut candidates, &pass, &mut patience) {
                     break;
                 }
@@ -328,7 +348,10 @@ impl Tight<'_> {
             }
             // A border that runs through a triangle is no leftover.
             let border = open.iter().map(|&t| self.weights[t as usize]).max().unwrap_or_default();
-            left += [0, 1].map(|side| (beside[side] - rest[side].max(0) - border).max(0)).iter().sum::<i64>();
+            left += [0, 1]
+                .map(|side| (beside[side] - rest[side].max(0) - border).max(0))
+                .iter()
+                .sum::<i64>();
         }
         left
     }

@@ -34,7 +34,11 @@ const CANDIDATES: &str = "500";
 
 /// Runs all and writes the tables into `page`.
 pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<()> {
-    ensure!(program.is_file(), "{}: build it first, cargo build --release", program.display());
+    ensure!(
+        program.is_file(),
+        "{}: build it first, cargo build --release",
+        program.display()
+    );
     fs::create_dir_all(results)?;
     let field = results.join("random_field.png");
     random_field().save(&field)?;
@@ -48,13 +52,31 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
     );
     for (name, picture) in &pictures {
         let contact = results.join(format!("{}.json", name.replace(' ', "-")));
-        answer(program, &["contact".into(), picture.clone(), "-o".into(), contact.clone(), "--force".into()])?;
+        answer(
+            program,
+            &[
+                "contact".into(),
+                picture.clone(),
+                "-o".into(),
+                contact.clone(),
+                "--force".into(),
+            ],
+        )?;
         for (mesh, units) in MESHES {
             println!("{mesh} {name}");
             let of = |method: &str| {
                 let output = results.join(format!("{mesh}-{}-{method}.ply", name.replace(' ', "-")));
                 let path = data.join(format!("meshes/{mesh}.obj"));
-                let words = ["--units", units, "--method", method, "--colours", "region", "--force", "--contact"];
+                let words = [
+                    "--units",
+                    units,
+                    "--method",
+                    method,
+                    "--colours",
+                    "region",
+                    "--force",
+                    "--contact",
+                ];
                 let mut all: Vec<PathBuf> = vec!["displace".into(), path, "-o".into(), output];
                 all.extend(words.map(PathBuf::from));
                 all.push(contact.clone());
@@ -62,7 +84,11 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
             };
             let (tight, paper) = (of("tight")?, of("paper")?);
             let number = |of: &Value, key: &str| of[key].as_f64().map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-            let share = |of: &Value, key: &str| of[key].as_f64().map_or_else(|| "-".to_owned(), |v| format!("{:.2} %", 100.0 * v));
+            let share = |of: &Value, key: &str| {
+                of[key]
+                    .as_f64()
+                    .map_or_else(|| "-".to_owned(), |v| format!("{:.2} %", 100.0 * v))
+            };
             writeln!(
                 text,
                 "| {mesh} | {} | {units} | {name} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
@@ -75,7 +101,9 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
                 share(&paper, "left_over_fraction"),
                 number(&paper, "emd_measured"),
                 tight["self_intersections"],
-                tight["seconds"].as_f64().map_or_else(|| "-".to_owned(), |s| format!("{s:.2}")),
+                tight["seconds"]
+                    .as_f64()
+                    .map_or_else(|| "-".to_owned(), |s| format!("{s:.2}")),
             )?;
         }
     }
@@ -92,7 +120,9 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
         made["candidates"],
         made["triangles"],
         made["seconds"].as_f64().unwrap_or_default(),
-        made["mean_emd_labels"].as_f64().map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"))
+        made["mean_emd_labels"]
+            .as_f64()
+            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"))
     )?;
     screenshot(&gallery.join("index.html"), &results.join("gallery.png"))?;
     replace_between(page, MARKS, &text)?;
@@ -104,7 +134,13 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
 fn screenshot(page: &Path, picture: &Path) -> Result<()> {
     let page = fs::canonicalize(page)?;
     let status = Command::new("chromium")
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--window-size=1400,900"])
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+            "--window-size=1400,900",
+        ])
         .arg(format!("--screenshot={}", picture.display()))
         .arg(format!("file://{}#0042", page.display()))
         .output();
@@ -138,12 +174,18 @@ fn random_field() -> GrayImage {
     let mut random = ChaCha8Rng::seed_from_u64(10);
     let waves: Vec<[f64; 3]> = (0..100)
         .map(|_| {
-            let (turn, k) = (TAU * random.random::<f64>(), TAU / 30.0 * (0.6 + 0.8 * random.random::<f64>()));
+            let (turn, k) = (
+                TAU * random.random::<f64>(),
+                TAU / 30.0 * (0.6 + 0.8 * random.random::<f64>()),
+            );
             [k * turn.cos(), k * turn.sin(), TAU * random.random::<f64>()]
         })
         .collect();
     GrayImage::from_fn(512, 512, |x, y| {
-        let sum: f64 = waves.iter().map(|[ky, kx, phase]| (ky * f64::from(y) + kx * f64::from(x) + phase).cos()).sum();
+        let sum: f64 = waves
+            .iter()
+            .map(|[ky, kx, phase]| (ky * f64::from(y) + kx * f64::from(x) + phase).cos())
+            .sum();
         Luma([if sum > 0.0 { 255 } else { 0 }])
     })
 }

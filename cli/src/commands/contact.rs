@@ -103,14 +103,19 @@ impl Contact {
         let Source { of, threshold, pixels } = match (&self.image, self.negative_law, self.positive_law) {
             (Some(image), ..) => self.measure(image)?,
             (None, Some(negative), Some(positive)) => Source {
-                of: ContactDistribution::from_laws(self.pixel_size, negative, positive, self.share).or_usage("--negative-law, --positive-law")?,
+                of: ContactDistribution::from_laws(self.pixel_size, negative, positive, self.share)
+                    .or_usage("--negative-law, --positive-law")?,
                 threshold: None,
                 pixels: None,
             },
             _ => return Err(Failure::usage("give an IMAGE, or --negative-law and --positive-law")),
         };
         let of = if self.invert { of.inverted() } else { of };
-        let of = self.edit.iter().try_fold(of, |of, &(bin, share)| of.edited(bin, share)).or_usage("--edit")?;
+        let of = self
+            .edit
+            .iter()
+            .try_fold(of, |of, &(bin, share)| of.edited(bin, share))
+            .or_usage("--edit")?;
         write_text(&self.output, &of.to_json())?;
         let mut answer = Answer::new("contact");
         answer

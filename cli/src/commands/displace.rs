@@ -182,7 +182,11 @@ impl Displace {
             }
             write_text(path, &design.to_json())?;
         }
-        self.write(&relief, &values, design.contact.positive().len().max(1) as f64 * design.contact.bin_width())?;
+        self.write(
+            &relief,
+            &values,
+            design.contact.positive().len().max(1) as f64 * design.contact.bin_width(),
+        )?;
         let census = EdgeCensus::of(&mesh);
         let crossings = self_intersections(&relief);
         Ok(self.tell(&made, &relief, census, crossings, began))
@@ -207,7 +211,12 @@ impl Displace {
             }
             (None, Some(path)) => {
                 let offset = |text: &str| text.parse::<Offset>().or_fail();
-                let mut design = Design::new(read_contact(path)?, 1.0, offset("in,0.02,sqrt")?, offset("out,0.03,sqrt")?);
+                let mut design = Design::new(
+                    read_contact(path)?,
+                    1.0,
+                    offset("in,0.02,sqrt")?,
+                    offset("out,0.03,sqrt")?,
+                );
                 design.seed = everywhere.seed;
                 design
             }
@@ -323,7 +332,10 @@ impl Displace {
             ));
         }
         if made.pieces > 1 {
-            answer.line(format!("{} pieces, each with its share of the distribution", made.pieces));
+            answer.line(format!(
+                "{} pieces, each with its share of the distribution",
+                made.pieces
+            ));
         }
         if census.crowded > 0 {
             answer.warn(Warning::new(

@@ -133,7 +133,10 @@ impl Explore {
             })
             .collect::<Result<_, Failure>>()?;
         drop(step);
-        let name = self.mesh.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let name = self
+            .mesh
+            .file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let table = json!({
             "mesh": name,
             "triangles": mesh.triangles.len(),
@@ -194,8 +197,14 @@ impl Explore {
             options.metric = Metric::along(axis.into(), factor).or_fail()?;
         }
         let made = reconstruct(&scaled, &design.contact, &options, &|_| ControlFlow::Continue(())).at(&self.mesh)?;
-        let relief = displace(mesh, &made.labels, &design.negative, &design.positive).at(&self.mesh)?.mesh;
-        let heights = relief.vertices.iter().zip(&mesh.vertices).map(|(a, b)| (a - b).norm_squared());
+        let relief = displace(mesh, &made.labels, &design.negative, &design.positive)
+            .at(&self.mesh)?
+            .mesh;
+        let heights = relief
+            .vertices
+            .iter()
+            .zip(&mesh.vertices)
+            .map(|(a, b)| (a - b).norm_squared());
         let roughness = (heights.sum::<f64>() / mesh.vertices.len().max(1) as f64).sqrt() / to_half_side(mesh);
         let camera = Camera {
             azimuth: f64::from(self.view[0]),
@@ -205,7 +214,9 @@ impl Explore {
         let picture = RenderOptions {
             ground: false,
             gloss: 0.15,
-            ..RenderOptions::default().with_size(self.pixels, self.pixels).with_samples(2)
+            ..RenderOptions::default()
+                .with_size(self.pixels, self.pixels)
+                .with_samples(2)
         };
         let clay = |_: &nalgebra::Point3<f64>| [0.78_f32, 0.7, 0.6];
         let picture = render_mesh(&relief, &clay, &camera, &picture).at(&self.mesh)?;
@@ -248,7 +259,13 @@ fn ranges(of: &Exploration, spread: Option<f64>) -> Value {
 
 /// Mean distance to the interface, distribution units.
 fn mean_distance(design: &Design) -> f64 {
-    let of = |shares: &[f64]| -> f64 { shares.iter().enumerate().map(|(k, share)| (k as f64 + 0.5) * share).sum() };
+    let of = |shares: &[f64]| -> f64 {
+        shares
+            .iter()
+            .enumerate()
+            .map(|(k, share)| (k as f64 + 0.5) * share)
+            .sum()
+    };
     design.contact.bin_width() * (of(design.contact.negative()) + of(design.contact.positive()))
 }
 

@@ -17,15 +17,34 @@ fn write_dots(file: &str) {
 #[test]
 fn from_a_picture_to_a_relief() {
     let folder = tempfile::tempdir().unwrap();
-    let [picture, contact, ball, relief, labels, design, again] =
-        ["dots.png", "c.json", "ball.obj", "relief.ply", "labels.csv", "design.json", "again.glb"].map(|name| path(&folder, name));
+    let [picture, contact, ball, relief, labels, design, again] = [
+        "dots.png",
+        "c.json",
+        "ball.obj",
+        "relief.ply",
+        "labels.csv",
+        "design.json",
+        "again.glb",
+    ]
+    .map(|name| path(&folder, name));
     write_dots(&picture);
     let measured = answer(&["contact", &picture, "-o", &contact]);
     let share = measured["positive_share"].as_f64().unwrap();
     assert!((share - std::f64::consts::PI * 64.0 / 576.0).abs() < 0.02, "{share}");
     answer(&["shape", "sphere", "--subdivide", "4", "-o", &ball]);
     let made = answer(&[
-        "displace", &ball, "--contact", &contact, "--units", "30", "--labels-out", &labels, "--design-out", &design, "-o", &relief,
+        "displace",
+        &ball,
+        "--contact",
+        &contact,
+        "--units",
+        "30",
+        "--labels-out",
+        &labels,
+        "--design-out",
+        &design,
+        "-o",
+        &relief,
     ]);
     let triangles = made["triangles"].as_u64().unwrap();
     assert!(made["violations"] == 0 && made["left_over_fraction"].as_f64().unwrap() < 0.005);
@@ -36,7 +55,23 @@ fn from_a_picture_to_a_relief() {
     // The design alone makes the same; another seed another; paper and colours too.
     let repeat = |more: &[&str]| {
         let labels = path(&folder, "more.csv");
-        answer(&[&["displace", &ball, "--design", &design, "--labels-out", &labels, "-o", &again, "--force"], more].concat());
+        answer(
+            &[
+                &[
+                    "displace",
+                    &ball,
+                    "--design",
+                    &design,
+                    "--labels-out",
+                    &labels,
+                    "-o",
+                    &again,
+                    "--force",
+                ],
+                more,
+            ]
+            .concat(),
+        );
         fs::read_to_string(labels).unwrap()
     };
     assert_eq!(repeat(&["--threads", "1"]), text);
@@ -46,7 +81,17 @@ fn from_a_picture_to_a_relief() {
     assert!(fs::read(&again).unwrap().starts_with(b"glTF"));
     // Finer triangles, and labels for all of them.
     let fine = answer(&[
-        "displace", &ball, "--contact", &contact, "--preset", "fig8-coral", "--edge-length", "0.05", "-o", &again, "--force",
+        "displace",
+        &ball,
+        "--contact",
+        &contact,
+        "--preset",
+        "fig8-coral",
+        "--edge-length",
+        "0.05",
+        "-o",
+        &again,
+        "--force",
     ]);
     assert!(fine["triangles"].as_u64().unwrap() > triangles);
 }
@@ -55,14 +100,30 @@ fn from_a_picture_to_a_relief() {
 fn distributions_from_formulas_and_edited() {
     let folder = tempfile::tempdir().unwrap();
     let [laws, edited] = ["laws.json", "edited.json"].map(|name| path(&folder, name));
-    let made = answer(&["contact", "--negative-law", "exponential:2", "--positive-law", "disc:4", "--share", "0.25", "-o", &laws]);
+    let made = answer(&[
+        "contact",
+        "--negative-law",
+        "exponential:2",
+        "--positive-law",
+        "disc:4",
+        "--share",
+        "0.25",
+        "-o",
+        &laws,
+    ]);
     assert!((made["positive_share"].as_f64().unwrap() - 0.25).abs() < 1e-9);
-    let made = answer(&["contact", &laws, "--edit", "0=0", "--edit", "-1=0", "--invert", "-o", &edited]);
-    assert_eq!((made["negative"][0].as_f64(), made["positive"][0].as_f64()), (Some(0.0), Some(0.0)));
+    let made = answer(&[
+        "contact", &laws, "--edit", "0=0", "--edit", "-1=0", "--invert", "-o", &edited,
+    ]);
+    assert_eq!(
+        (made["negative"][0].as_f64(), made["positive"][0].as_f64()),
+        (Some(0.0), Some(0.0))
+    );
     // A volume of pores.
     let volume = path(&folder, "v.npy");
     let bytes: Vec<u8> = (0..1000_u32).map(|i| if i % 10 < 4 { 200 } else { 10 }).collect();
-    let mut header = b"\x93NUMPY\x01\x00\x76\x00{'descr': '|u1', 'fortran_order': False, 'shape': (10, 10, 10), }".to_vec();
+    let mut header =
+        b"\x93NUMPY\x01\x00\x76\x00{'descr': '|u1', 'fortran_order': False, 'shape': (10, 10, 10), }".to_vec();
     header.resize(127, b' ');
     header.push(b'\n');
     fs::write(&volume, [header, bytes].concat()).unwrap();
@@ -83,12 +144,29 @@ fn a_gallery_opens_from_disk() {
     let design = format!("{gallery}/designs/0002.json");
     let relief = path(&folder, "relief.obj");
     answer(&["displace", &ball, "--design", &design, "-o", &relief]);
-    answer(&["explore", &ball, "--count", "2", "--pixels", "32", "--near", &design, "--spread", "0.1", "-o", &closer]);
+    answer(&[
+        "explore", &ball, "--count", "2", "--pixels", "32", "--near", &design, "--spread", "0.1", "-o", &closer,
+    ]);
     // The same seed, the same bytes.
     let twin = path(&folder, "twin");
-    answer(&["explore", &ball, "--count", "3", "--pixels", "32", "-o", &twin, "--threads", "1"]);
+    answer(&[
+        "explore",
+        &ball,
+        "--count",
+        "3",
+        "--pixels",
+        "32",
+        "-o",
+        &twin,
+        "--threads",
+        "1",
+    ]);
     for name in ["pictures/0001.png", "designs/0003.json", "index.html"] {
-        assert_eq!(fs::read(format!("{gallery}/{name}")).unwrap(), fs::read(format!("{twin}/{name}")).unwrap(), "{name}");
+        assert_eq!(
+            fs::read(format!("{gallery}/{name}")).unwrap(),
+            fs::read(format!("{twin}/{name}")).unwrap(),
+            "{name}"
+        );
     }
 }
 
@@ -110,18 +188,43 @@ fn bad_distributions_and_meshes_are_refused() {
         (r#"{"bin_width": 1, "negative": [], "positive": []}"#, "empty"),
         (r#"{"bin_width": 1, "negative": [-1], "positive": [2]}"#, "not negative"),
         (r#"{"bin_width": 0, "negative": [1], "positive": [2]}"#, "width"),
-        (r#"{"bin_width": 1, "negative": [null], "positive": [2]}"#, "contact distribution"),
+        (
+            r#"{"bin_width": 1, "negative": [null], "positive": [2]}"#,
+            "contact distribution",
+        ),
     ] {
         fs::write(&contact, text).unwrap();
         refused(what, displace);
     }
-    image::GrayImage::from_pixel(8, 8, image::Luma([255])).save(&white).unwrap();
+    image::GrayImage::from_pixel(8, 8, image::Luma([255]))
+        .save(&white)
+        .unwrap();
     refused("one grey value", &["contact", &white, "-o", &path(&folder, "x.json")]);
     for wrong in [
         &["displace", &mesh, "-o", &out] as &[&str],
         &["displace", &mesh, "--contact", &contact, "--units", "-1", "-o", &out],
-        &["displace", &mesh, "--contact", &contact, "--units", "5", "--negative", "up,1,x", "-o", &out],
-        &["displace", &mesh, "--contact", &contact, "--preset", "nonsense", "-o", &out],
+        &[
+            "displace",
+            &mesh,
+            "--contact",
+            &contact,
+            "--units",
+            "5",
+            "--negative",
+            "up,1,x",
+            "-o",
+            &out,
+        ],
+        &[
+            "displace",
+            &mesh,
+            "--contact",
+            &contact,
+            "--preset",
+            "nonsense",
+            "-o",
+            &out,
+        ],
         &["contact", "-o", &out],
         &["explore", &mesh, "--units", "9,3", "-o", "g"],
     ] {

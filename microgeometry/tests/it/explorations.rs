@@ -25,7 +25,14 @@ proptest! {
 #[test]
 fn wrong_ranges_are_refused() {
     for wrong in [[0.0, 1.0], [2.0, 1.0], [f64::NAN, 1.0], [1.0, f64::INFINITY]] {
-        assert!(Exploration { units: wrong, ..Exploration::default() }.design(0, 0).is_err());
+        assert!(
+            Exploration {
+                units: wrong,
+                ..Exploration::default()
+            }
+            .design(0, 0)
+            .is_err()
+        );
     }
     let design = Exploration::default().design(0, 0).unwrap();
     assert!(Exploration::default().near(&design, -1.0, 0, 0).is_err());

@@ -71,8 +71,18 @@ proptest! {
 fn counts_are_exact() {
     let mesh = TriangleMesh::icosphere(2.0, 5);
     let of = ContactDistribution::new(1.0, vec![0.25, 0.15, 0.08, 0.02], vec![0.25, 0.15, 0.08, 0.02]).unwrap();
-    let made = on(&mesh, 40.0, &of, &ReconstructOptions::default().with_weighting(Weighting::Count));
-    assert!(made.misplaced < 0.001 && made.left_over < 0.001, "{} {}", made.misplaced, made.left_over);
+    let made = on(
+        &mesh,
+        40.0,
+        &of,
+        &ReconstructOptions::default().with_weighting(Weighting::Count),
+    );
+    assert!(
+        made.misplaced < 0.001 && made.left_over < 0.001,
+        "{} {}",
+        made.misplaced,
+        made.left_over
+    );
     let counted = made.labels.iter().filter(|x| **x >= 2.0 && **x < 3.0).count() as f64;
     assert!((counted - 0.08 * 20480.0).abs() <= 2.0, "{counted}");
 }

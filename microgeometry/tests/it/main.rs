@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a test that cannot set itself up should stop there
 #![allow(clippy::cast_possible_truncation)] // pixels and triangles of small tests
+#![allow(clippy::float_cmp)] // powers of two, and what must be the same bits
 
 mod bad_input;
 mod explorations;
@@ -35,7 +36,11 @@ fn random_field(seed: u64, wave: f64) -> ContactDistribution {
         })
         .collect();
     let picture = Array2::from_shape_fn((256, 256), |(y, x)| {
-        waves.iter().map(|[ky, kx, phase]| (ky * y as f64 + kx * x as f64 + phase).cos()).sum::<f64>() > 0.0
+        waves
+            .iter()
+            .map(|[ky, kx, phase]| (ky * y as f64 + kx * x as f64 + phase).cos())
+            .sum::<f64>()
+            > 0.0
     });
     contact_of_picture(picture.view(), &EstimateOptions::default()).unwrap()
 }

@@ -1,7 +1,7 @@
 //! How well distributions are rebuilt.
 
 use nalgebra::Vector3;
-use stereology_microgeometry::{ContactDistribution, Law, Metric, Method, ReconstructOptions};
+use stereology_microgeometry::{ContactDistribution, Law, Method, Metric, ReconstructOptions};
 use stereology_shape::TriangleMesh;
 
 use crate::{on, random_field};
@@ -11,9 +11,24 @@ use crate::{on, random_field};
 fn random_fields_are_rebuilt() {
     let of = random_field(1, 26.0);
     for seed in 0..3 {
-        let made = on(&TriangleMesh::icosphere(2.0, 5), 60.0, &of, &ReconstructOptions::default().with_seed(seed));
-        assert!(made.left_over < 0.005 && made.misplaced < 0.01, "{} {}", made.left_over, made.misplaced);
-        assert!(made.emd_labels < 0.1 && made.emd_measured.unwrap() < 0.4, "{} {:?}", made.emd_labels, made.emd_measured);
+        let made = on(
+            &TriangleMesh::icosphere(2.0, 5),
+            60.0,
+            &of,
+            &ReconstructOptions::default().with_seed(seed),
+        );
+        assert!(
+            made.left_over < 0.005 && made.misplaced < 0.01,
+            "{} {}",
+            made.left_over,
+            made.misplaced
+        );
+        assert!(
+            made.emd_labels < 0.1 && made.emd_measured.unwrap() < 0.4,
+            "{} {:?}",
+            made.emd_labels,
+            made.emd_measured
+        );
     }
 }
 
@@ -33,7 +48,12 @@ fn the_papers_method_leaves_triangles_over() {
 #[test]
 fn what_a_mesh_cannot_hold_is_told() {
     let of = ContactDistribution::from_laws(1.0, Law::Uniform(30.0), Law::Uniform(30.0), 0.5).unwrap();
-    let made = on(&TriangleMesh::icosphere(2.0, 3), 10.0, &of, &ReconstructOptions::default());
+    let made = on(
+        &TriangleMesh::icosphere(2.0, 3),
+        10.0,
+        &of,
+        &ReconstructOptions::default(),
+    );
     assert_eq!(made.violations, 0);
     assert!(made.misplaced > 0.2);
     let first = made.shortfalls[0];
@@ -45,7 +65,12 @@ fn what_a_mesh_cannot_hold_is_told() {
 fn an_anisotropic_metric_draws_structures_out() {
     let of = random_field(2, 40.0);
     let ball = TriangleMesh::icosphere(2.0, 5);
-    let centre = |t: &[u32; 3]| t.iter().map(|&v| ball.vertices[v as usize].coords).sum::<Vector3<f64>>() / 3.0;
+    let centre = |t: &[u32; 3]| {
+        t.iter()
+            .map(|&v| ball.vertices[v as usize].coords)
+            .sum::<Vector3<f64>>()
+            / 3.0
+    };
     let centres: Vec<Vector3<f64>> = ball.triangles.iter().map(centre).collect();
     let near = |p: Vector3<f64>| {
         let far = |t: &usize| (centres[*t] - p).norm_squared();
@@ -70,6 +95,9 @@ fn an_anisotropic_metric_draws_structures_out() {
         };
         same(1) - same(2)
     };
-    let (even, drawn) = (agreement(Metric::Isotropic), agreement(Metric::along(Vector3::z(), 4.0).unwrap()));
+    let (even, drawn) = (
+        agreement(Metric::Isotropic),
+        agreement(Metric::along(Vector3::z(), 4.0).unwrap()),
+    );
     assert!(even.abs() < 0.1 && drawn > 0.15, "{even} {drawn}");
 }

@@ -52,7 +52,8 @@ proptest! {
 #[test]
 fn loop_works_on_open_meshes() {
     let mut cup = TriangleMesh::icosphere(2.0, 2);
-    cup.triangles.retain(|t| t.iter().all(|&v| cup.vertices[v as usize].z < 0.4));
+    cup.triangles
+        .retain(|t| t.iter().all(|&v| cup.vertices[v as usize].z < 0.4));
     let fine = refined(&cup, Subdivision::Loop, 0.1).unwrap();
     assert!(EdgeCensus::of(&cup).border > 0 && EdgeCensus::of(&fine).crowded == 0);
     assert!(EdgeCensus::of(&fine).border >= 2 * EdgeCensus::of(&cup).border);
@@ -65,7 +66,12 @@ fn pieces_get_their_shares() {
     let of = random_field(3, 18.0);
     let small = TriangleMesh::icosphere(1.6, 4).mapped(|p| p + Vector3::new(4.0, 0.0, 0.0));
     let both = TriangleMesh::icosphere(2.0, 4).with(&small);
-    let made = on(&both, 80.0, &of, &ReconstructOptions::default().with_weighting(Weighting::Count));
+    let made = on(
+        &both,
+        80.0,
+        &of,
+        &ReconstructOptions::default().with_weighting(Weighting::Count),
+    );
     assert_eq!(made.pieces, 2);
     for piece in made.labels.chunks(5120) {
         let share = piece.iter().filter(|x| !x.is_sign_negative()).count() as f64 / 5120.0;
@@ -78,9 +84,16 @@ fn pieces_get_their_shares() {
 fn uneven_meshes_are_weighted_by_area() {
     let mut mesh = TriangleMesh::icosphere(2.0, 4);
     // One half four times finer.
-    let (fine, coarse): (Vec<_>, Vec<_>) = mesh.triangles.iter().copied().partition(|t| mesh.vertices[t[0] as usize].x > 0.0);
+    let (fine, coarse): (Vec<_>, Vec<_>) = mesh
+        .triangles
+        .iter()
+        .copied()
+        .partition(|t| mesh.vertices[t[0] as usize].x > 0.0);
     let split = |triangles: Vec<[u32; 3]>, length: f64| {
-        let part = TriangleMesh { vertices: mesh.vertices.clone(), triangles };
+        let part = TriangleMesh {
+            vertices: mesh.vertices.clone(),
+            triangles,
+        };
         refined(&part, Subdivision::Midpoint, length).unwrap()
     };
     mesh = split(coarse, 1.0).with(&split(fine, 0.045));
@@ -88,7 +101,12 @@ fn uneven_meshes_are_weighted_by_area() {
     let of = random_field(4, 22.0);
     let made = on(&mesh, 50.0, &of, &ReconstructOptions::default());
     assert!(made.emd_labels < 0.05 && made.violations == 0, "{}", made.emd_labels);
-    let paper = on(&mesh, 50.0, &of, &ReconstructOptions::default().with_method(Method::Paper));
+    let paper = on(
+        &mesh,
+        50.0,
+        &of,
+        &ReconstructOptions::default().with_method(Method::Paper),
+    );
     assert_eq!(paper.violations, 0);
 }
 
@@ -101,7 +119,11 @@ fn simplification_spends_triangles_on_relief() {
         .iter()
         .map(|t| {
             let p = ball.vertices[t[0] as usize];
-            if p.x > 0.0 { 2.0 * (14.0 * p.y).sin() * (14.0 * p.z).sin() } else { 0.0 }
+            if p.x > 0.0 {
+                2.0 * (14.0 * p.y).sin() * (14.0 * p.z).sin()
+            } else {
+                0.0
+            }
         })
         .collect();
     let offset = |text: &str| text.parse::<Offset>().unwrap();
@@ -109,7 +131,12 @@ fn simplification_spends_triangles_on_relief() {
     let simple = simplified(&relief.mesh, &relief.values, 4000);
     assert_eq!(EdgeCensus::of(&simple.mesh), EdgeCensus { border: 0, crowded: 0 });
     assert!(simple.mesh.triangles.len() <= 4000 && simple.values.len() == simple.mesh.vertices.len());
-    let rough = simple.mesh.triangles.iter().filter(|t| simple.mesh.vertices[t[0] as usize].x > 0.0).count();
+    let rough = simple
+        .mesh
+        .triangles
+        .iter()
+        .filter(|t| simple.mesh.vertices[t[0] as usize].x > 0.0)
+        .count();
     assert!(rough > 2 * (simple.mesh.triangles.len() - rough), "{rough}");
     let before = ClosedMesh::try_from(relief.mesh).unwrap().volume();
     let after = ClosedMesh::try_from(simple.mesh).unwrap().volume();

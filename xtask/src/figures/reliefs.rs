@@ -57,12 +57,19 @@ fn field() -> Result<ContactDistribution> {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let waves: Vec<[f64; 3]> = (0..80)
         .map(|_| {
-            let (turn, k) = (TAU * random.random::<f64>(), TAU / 26.0 * (0.6 + 0.8 * random.random::<f64>()));
+            let (turn, k) = (
+                TAU * random.random::<f64>(),
+                TAU / 26.0 * (0.6 + 0.8 * random.random::<f64>()),
+            );
             [k * turn.cos(), k * turn.sin(), TAU * random.random::<f64>()]
         })
         .collect();
     let picture = Array2::from_shape_fn((400, 400), |(y, x)| {
-        waves.iter().map(|[ky, kx, phase]| (ky * y as f64 + kx * x as f64 + phase).cos()).sum::<f64>() > 0.0
+        waves
+            .iter()
+            .map(|[ky, kx, phase]| (ky * y as f64 + kx * x as f64 + phase).cos())
+            .sum::<f64>()
+            > 0.0
     });
     Ok(contact_of_picture(picture.view(), &EstimateOptions::default())?)
 }
@@ -72,11 +79,17 @@ fn fine(mesh: TriangleMesh, edge: f64) -> Result<TriangleMesh> {
 }
 
 fn bar() -> Result<TriangleMesh> {
-    fine(Body::superellipsoid([1.0, 0.36, 0.42], [0.35, 0.35])?.to_triangles(5), 0.028)
+    fine(
+        Body::superellipsoid([1.0, 0.36, 0.42], [0.35, 0.35])?.to_triangles(5),
+        0.028,
+    )
 }
 
 fn disc() -> Result<TriangleMesh> {
-    fine(Body::superellipsoid([1.0, 0.28, 1.0], [0.6, 1.0])?.to_triangles(5), 0.03)
+    fine(
+        Body::superellipsoid([1.0, 0.28, 1.0], [0.6, 1.0])?.to_triangles(5),
+        0.03,
+    )
 }
 
 fn ball() -> TriangleMesh {
@@ -91,7 +104,11 @@ fn ring() -> TriangleMesh {
 fn blade() -> Result<TriangleMesh> {
     let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
         let (x, y, z) = (p.x, p.y, p.z);
-        let waist = if y < -0.45 { 0.45 } else { 1.0 - 0.55 * ((y + 0.45) / 1.45).max(0.0) };
+        let waist = if y < -0.45 {
+            0.45
+        } else {
+            1.0 - 0.55 * ((y + 0.45) / 1.45).max(0.0)
+        };
         Point3::new(0.62 * waist * x, 1.1 * y, 0.16 * z * (1.0 - 0.6 * x * x))
     });
     fine(shaped, 0.028)
@@ -131,7 +148,12 @@ fn options(side: u32) -> RenderOptions {
 
 fn relief(mesh: &TriangleMesh, of: &Recipe, seed: u64, side: u32) -> Result<RgbImage> {
     let labels = labels(mesh, of, seed)?;
-    let made = displace(mesh, &labels, &of.negative.parse::<Offset>()?, &of.positive.parse::<Offset>()?)?;
+    let made = displace(
+        mesh,
+        &labels,
+        &of.negative.parse::<Offset>()?,
+        &of.positive.parse::<Offset>()?,
+    )?;
     let near = Nearest::new(&made.mesh);
     let [negative, positive] = of.colours;
     let colour = |p: &Point3<f64>| {
@@ -232,9 +254,14 @@ fn before_and_after() -> Result<RgbImage> {
 
 /// Figure 3: twenty instances of one material.
 fn instances() -> Result<RgbImage> {
-    let mesh = fine(Body::superellipsoid([1.0, 0.7, 0.8], [0.8, 0.8])?.to_triangles(5), 0.035)?;
+    let mesh = fine(
+        Body::superellipsoid([1.0, 0.7, 0.8], [0.8, 0.8])?.to_triangles(5),
+        0.035,
+    )?;
     let recipe = coral()?;
-    let parts = (1..=20).map(|seed| relief(&mesh, &recipe, seed, 200)).collect::<Result<_>>()?;
+    let parts = (1..=20)
+        .map(|seed| relief(&mesh, &recipe, seed, 200))
+        .collect::<Result<_>>()?;
     Ok(rows(parts, 5))
 }
 
@@ -242,7 +269,10 @@ fn instances() -> Result<RgbImage> {
 fn many_meshes() -> Result<RgbImage> {
     let recipe = crisped()?;
     let meshes = [ball(), ring(), bar()?, disc()?, blade()?];
-    let parts: Vec<RgbImage> = meshes.iter().map(|mesh| relief(mesh, &recipe, 3, SIDE)).collect::<Result<_>>()?;
+    let parts: Vec<RgbImage> = meshes
+        .iter()
+        .map(|mesh| relief(mesh, &recipe, 3, SIDE))
+        .collect::<Result<_>>()?;
     Ok(row(&parts))
 }
 
@@ -279,7 +309,12 @@ fn labelled(mesh: &TriangleMesh, labels: &[f64], far: f64, from: f64) -> Result<
         vertices: mesh
             .triangles
             .iter()
-            .map(|t| t.iter().map(|&v| mesh.vertices[v as usize].coords).sum::<Vector3<f64>>() / 3.0)
+            .map(|t| {
+                t.iter()
+                    .map(|&v| mesh.vertices[v as usize].coords)
+                    .sum::<Vector3<f64>>()
+                    / 3.0
+            })
             .map(Point3::from)
             .collect(),
         triangles: Vec::new(),
@@ -291,7 +326,11 @@ fn labelled(mesh: &TriangleMesh, labels: &[f64], far: f64, from: f64) -> Result<
             return [0.97_f32; 3];
         }
         let pale = (1.0 - 0.85 * (0.25 + 0.75 * label.abs() / far)).clamp(0.0, 1.0) as f32;
-        if label < 0.0 { [pale, pale, 0.85] } else { [0.85, pale, pale] }
+        if label < 0.0 {
+            [pale, pale, 0.85]
+        } else {
+            [0.85, pale, pale]
+        }
     };
     Ok(render_mesh(mesh, &colour, &camera(), &options(SIDE))?)
 }
@@ -316,7 +355,10 @@ fn distributions(path: &Path) -> Result<()> {
         ("planet", planet()?),
     ];
     let bins = 18;
-    let values: Vec<Vec<f64>> = recipes.iter().map(|(_, recipe)| signed(&recipe.contact, bins)).collect();
+    let values: Vec<Vec<f64>> = recipes
+        .iter()
+        .map(|(_, recipe)| signed(&recipe.contact, bins))
+        .collect();
     let panels: Vec<Panel<'_>> = recipes
         .iter()
         .zip(&values)
@@ -365,7 +407,12 @@ fn porous(path: &Path) -> Result<RgbImage> {
     let own = |shares: &[f64], share: f64| -> Vec<f64> { shares.iter().map(|s| s / share).collect() };
     let (phi, phi_seen) = (of.positive_share(), seen.positive_share());
     let parts = [
-        (own(of.negative(), 1.0 - phi), own(seen.negative(), 1.0 - phi_seen), "pores", BLUE),
+        (
+            own(of.negative(), 1.0 - phi),
+            own(seen.negative(), 1.0 - phi_seen),
+            "pores",
+            BLUE,
+        ),
         (own(of.positive(), phi), own(seen.positive(), phi_seen), "material", RED),
     ];
     let panels: Vec<Panel<'_>> = parts
@@ -393,7 +440,11 @@ fn porous(path: &Path) -> Result<RgbImage> {
     bars::draw(path, &panels, 2)?;
     let slice = solid.slice(s![n / 2, .., ..]);
     Ok(RgbImage::from_fn(3 * n as u32, 3 * n as u32, |x, y| {
-        image::Rgb(if slice[[y as usize / 3, x as usize / 3]] { [214, 205, 190] } else { [52, 60, 76] })
+        image::Rgb(if slice[[y as usize / 3, x as usize / 3]] {
+            [214, 205, 190]
+        } else {
+            [52, 60, 76]
+        })
     }))
 }
 
@@ -423,7 +474,13 @@ fn merging(path: &Path) -> Result<()> {
             panel("negative region", "distance", "probability", negative.as_slice(), BLUE),
             panel("positive region", "distance", "probability", positive.as_slice(), RED),
             panel("merged", "distance, -8 to 8 bins", "share", merged.as_slice(), GREY),
-            panel("histogram of 20,480 triangles", "distance, -8 to 8 bins", "triangles", histogram.as_slice(), GREY),
+            panel(
+                "histogram of 20,480 triangles",
+                "distance, -8 to 8 bins",
+                "triangles",
+                histogram.as_slice(),
+                GREY,
+            ),
         ],
         2,
     )

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use image::{RgbImage, imageops};
 use nalgebra::{Point3, Vector3};
-use ndarray::{Array2, Array3, s};
+use ndarray::{Array2, Array3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::microgeometry::{
@@ -438,7 +438,7 @@ fn porous(path: &Path) -> Result<RgbImage> {
         })
         .collect();
     bars::draw(path, &panels, 2)?;
-    let slice = solid.slice(s![n / 2, .., ..]);
+    let slice = solid.index_axis(Axis(0), n / 2);
     Ok(RgbImage::from_fn(3 * n as u32, 3 * n as u32, |x, y| {
         image::Rgb(if slice[[y as usize / 3, x as usize / 3]] {
             [214, 205, 190]

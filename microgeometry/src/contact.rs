@@ -1,5 +1,8 @@
 //! How far the points of two regions lie from the interface between them: a histogram with a sign.
-#![allow(clippy::cast_possible_truncation, reason = "bins are checked against their largest number before")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "bins are checked against their largest number before"
+)]
 
 use serde::{Deserialize, Serialize};
 
@@ -274,7 +277,10 @@ impl ContactDistribution {
 
     /// The file's text.
     #[must_use]
-    #[allow(clippy::missing_panics_doc, reason = "a structure of numbers and strings can always be written")]
+    #[allow(
+        clippy::missing_panics_doc,
+        reason = "a structure of numbers and strings can always be written"
+    )]
     pub fn to_json(&self) -> String {
         let written = Written {
             schema: SCHEMA.to_owned(),

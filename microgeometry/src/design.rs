@@ -97,7 +97,10 @@ impl Design {
     /// # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
     /// ```
     #[must_use]
-    #[allow(clippy::missing_panics_doc, reason = "a structure of numbers and strings can always be written")]
+    #[allow(
+        clippy::missing_panics_doc,
+        reason = "a structure of numbers and strings can always be written"
+    )]
     pub fn to_json(&self) -> String {
         let offset = |of: &Offset| WrittenOffset {
             direction: of.direction.name().to_owned(),

@@ -1,5 +1,8 @@
 //! Contact distributions measured on pictures and volumes (section 5.3 and figure 8 of the paper).
-#![allow(clippy::cast_possible_truncation, reason = "distances in pixels of a picture in memory")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "distances in pixels of a picture in memory"
+)]
 
 use ndarray::{ArrayView2, ArrayView3, Axis};
 

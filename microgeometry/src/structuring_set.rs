@@ -1,5 +1,8 @@
 //! Contact distributions of eq. (1) with other sets than discs.
-#![allow(clippy::cast_possible_truncation, reason = "distances in pixels of a picture in memory")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "distances in pixels of a picture in memory"
+)]
 
 use std::f64::consts::{PI, TAU};
 

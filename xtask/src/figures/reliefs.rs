@@ -118,7 +118,7 @@ fn blade() -> Result<TriangleMesh> {
 fn bust() -> Result<TriangleMesh> {
     let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
         let t = (PI * (p.y + 1.0) / 2.0).clamp(0.0, PI);
-        let wide = 0.62 - 0.22 * (2.6 * (t - 0.9)).cos() * f64::from(u8::from(t < 2.1));
+        let wide = 0.34 + 0.14 * (1.0 + (2.0 * (t - 2.1)).cos());
         let nose = 0.22 * (-40.0 * (p.x * p.x + (p.y - 0.3).powi(2))).exp() * p.z.max(0.0);
         Point3::new(wide * p.x, 1.1 * p.y, (wide * 1.1) * p.z + nose)
     });
@@ -211,7 +211,7 @@ fn crisped() -> Result<Recipe> {
 
 fn clay() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Rayleigh(3.0), Law::Rayleigh(2.2), 0.45)?,
+        contact: laws(Law::Exponential(1.8), Law::Disc(4.0), 0.45)?,
         units: 30.0,
         negative: "in,0.015,x",
         positive: "out,0.02,sqrt",
@@ -221,7 +221,7 @@ fn clay() -> Result<Recipe> {
 
 fn planet() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Exponential(9.0), Law::Exponential(4.0), 0.33)?,
+        contact: laws(Law::Exponential(5.0), Law::Exponential(2.5), 0.33)?,
         units: 36.65,
         negative: "none",
         positive: "out,0.016,sqrt",

@@ -21,9 +21,6 @@ const REFUSALS: u32 = 32;
 /// How often the candidates are put in order again.
 const ROUNDS: u32 = 16;
 
-/// So many of the candidates nearest to their region are tried where others were refused.
-const NEAREST: usize = 4096;
-
 /// Seeds are tried in order of slack + APART × distance to the own region + CHANCE × a random share of a bin, both distances up to REACH bins.
 ///
 /// Of random fields on four meshes, APART 0 leaves the distances measured afterwards .26 to .5 bins off, .4 .2 to .35; a reach of 6 bins makes one large clump (1 to 6 bins off). CHANCE between .1 and 1 does not matter to them.
@@ -180,7 +177,7 @@ impl Tight<'_> {
         );
         // First within the room of every level; then what would be handed down anyway may already be used below.
         for hand_down in [false, true] {
-            for round in 0..ROUNDS {
+            for _ in 0..ROUNDS {
                 if room[side][level] <= 0 {
                     return;
                 }
@@ -192,10 +189,6 @@ impl Tight<'_> {
                         apart + 1e-3 * self.bin * f64::from((dice[t as usize] + turn).fract()),
                         t,
                     );
-                }
-                if round == 0 && !hand_down && candidates.len() > NEAREST {
-                    candidates.select_nth_unstable(NEAREST);
-                    candidates.truncate(NEAREST);
                 }
                 let mut patience = PATIENCE * open.len() as u64;
                 let pass = Pass {

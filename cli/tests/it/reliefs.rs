@@ -88,7 +88,7 @@ fn from_a_picture_to_a_relief() {
         "--preset",
         "fig8-coral",
         "--edge-length",
-        "0.05",
+        "0.02",
         "-o",
         &again,
         "--force",

@@ -29,13 +29,6 @@ impl Failure {
         }
     }
 
-    /// Part of the interface, but not built: exit 2.
-    pub fn not_available(what: impl Display) -> Self {
-        Self::usage(format!(
-            "{what} is not available yet; `stereology --help` lists what is"
-        ))
-    }
-
     /// Stopped by Ctrl-C: exit 130, as shells expect.
     pub fn stopped() -> Self {
         Self {
@@ -107,7 +100,7 @@ impl<T, E: Display> Explain<T> for Result<T, E> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Explain, Failure};
+    use super::Explain;
     use std::path::Path;
 
     #[test]
@@ -120,12 +113,5 @@ mod tests {
         };
         assert_eq!(at("no header"), "a.csv: no header");
         assert_eq!(at("a.csv has no header"), "a.csv has no header");
-    }
-
-    #[test]
-    fn what_is_not_built_is_usage() {
-        let failure = Failure::not_available("carve");
-        assert_eq!(failure.code(), 2);
-        assert!(failure.to_string().contains("not available yet"));
     }
 }

@@ -36,6 +36,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing, if the material is that smooth; otherwise look at the picture.",
     ),
     (
+        "crowded-edges",
+        "Some edges of the mesh have more than two triangles. The reconstruction takes all of them as neighbours.",
+        "Nothing, or mend the mesh if that is not what you meant.",
+    ),
+    (
         "edge-heavy",
         "Many profiles touch the edge of the photograph.",
         "Take a photograph of a larger area: it should be at least ten times as wide as the largest profile.",
@@ -161,6 +166,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Mend the mesh (a boolean union in a mesh editor).",
     ),
     (
+        "sharp-relief",
+        "The displaced mesh cuts through itself.",
+        "Smaller k, or a profile that rises less (sqrt), or a finer mesh (--edge-length).",
+    ),
+    (
         "slices-left-out",
         "The volume has more slices than are measured: they were taken at even distances.",
         "Nothing, or a larger --at-most.",
@@ -184,6 +194,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "types-ignored",
         "Some profiles of the table have no type, so types were not used.",
         "Fill the column `type` in every row, or remove it.",
+    ),
+    (
+        "unrealisable-distribution",
+        "The mesh cannot hold the contact distribution: some distances found no place and moved towards the interface.",
+        "More --units (the structure gets finer), or a distribution without the longest distances (contact --edit).",
     ),
     (
         "unstable-count",

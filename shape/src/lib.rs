@@ -104,6 +104,7 @@ pub use periodic_box::{BoxError, PeriodicBox};
 pub use point_file::{parse_points, read_points};
 pub use section::{SectionPolygon, section_polygons};
 pub use section_areas::{Knots, SectionAreas};
+pub use self_intersection::self_intersections;
 pub use subdivision::Subdivision;
 pub use textured_mesh::{Texture, TexturedMesh};
 #[cfg(feature = "io")]

@@ -9,7 +9,7 @@ use nalgebra::{Point2, Point3};
 use robust::{Coord, orient2d, orient3d};
 
 use crate::measures::double_area;
-use crate::topology::Neighbours;
+use crate::topology::{Neighbours, known_neighbours};
 use crate::triangle_mesh::{TriangleMesh, index};
 use crate::winding::coord;
 
@@ -25,6 +25,25 @@ pub(crate) struct Crossing {
     pub(crate) triangles: [usize; 2],
     pub(crate) place: Point3<f64>,
     pub(crate) count: usize,
+}
+
+/// How many pairs of triangles cross each other, where the search stops at 1000: 0 for a surface that does not cut through itself. Open surfaces and edges with more than two triangles are allowed; triangles beside each other are not asked. Exact
+/// signs of determinants, crossings shallower than 10⁻⁷ of the extent left out as rounding. Indices must be in range. Cost: T log T, and the pairs of triangles whose boxes overlap.
+///
+/// ```
+/// use stereology_shape::{TriangleMesh, self_intersections};
+///
+/// let cube = TriangleMesh::cuboid([1.0; 3]);
+/// assert_eq!(self_intersections(&cube), 0);
+/// let turned = nalgebra::Rotation3::from_euler_angles(0.3, 0.7, 1.1);
+/// assert!(self_intersections(&cube.clone().with(&cube.mapped(|p| turned * p))) > 0);
+/// ```
+#[must_use]
+pub fn self_intersections(mesh: &TriangleMesh) -> usize {
+    if mesh.triangles.is_empty() {
+        return 0;
+    }
+    first_crossing(mesh, &known_neighbours(mesh)).map_or(0, |crossing| crossing.count)
 }
 
 /// The first crossing of the surface with itself. Cost: T log T, and the pairs of triangles whose boxes overlap.
@@ -79,6 +98,10 @@ fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: 
 /// On which side of the plane of `plane` each corner lies: 1 where its normal points, -1, or 0; exact.
 fn sides(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3]) -> [i8; 3] {
     corners.map(|p| {
+        // A shared corner is the common case, and the slowest for the predicate.
+        if plane.contains(&p) {
+            return 0;
+        }
         sign(-orient3d(
             coord(&plane[0]),
             coord(&plane[1]),
@@ -153,7 +176,10 @@ fn edge_passes(
     };
     let corners = mesh.triangles[t as usize];
     let (from, to) = (corners[(free + 1) % 3], corners[(free + 2) % 3]);
-    let beyond = mesh.triangles[across[t as usize][(free + 1) % 3] as usize];
+    // Nothing lies beyond a border.
+    let Some(beyond) = mesh.triangles.get(across[t as usize][(free + 1) % 3] as usize) else {
+        return false;
+    };
     let Some(&opposite) = beyond.iter().find(|&&v| v != from && v != to) else {
         return false;
     };

@@ -75,6 +75,18 @@ pub(crate) fn neighbours(mesh: &TriangleMesh) -> Result<Neighbours, MeshError> {
     Ok(across)
 }
 
+/// Pairs the triangles over the edges that have exactly two; none (`u32::MAX`) over others.
+pub(crate) fn known_neighbours(mesh: &TriangleMesh) -> Neighbours {
+    let mut across = vec![[u32::MAX; 3]; mesh.triangles.len()];
+    for group in sorted_sides(mesh).chunk_by(|a, b| a.edge == b.edge) {
+        if let [one, two] = group {
+            across[one.triangle as usize][usize::from(one.corner)] = two.triangle;
+            across[two.triangle as usize][usize::from(two.corner)] = one.triangle;
+        }
+    }
+    across
+}
+
 /// The connected bodies of the mesh's surface, each a list of triangles in order of its lowest triangle.
 pub(crate) fn components(across: &Neighbours) -> Vec<Vec<u32>> {
     let mut seen = vec![false; across.len()];

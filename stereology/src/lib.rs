@@ -17,6 +17,7 @@
 //! | [`volume`] | Which colour is at this point of the solid? |
 //! | [`render`] | What does it look like? |
 //! | [`exemplar`] | Which solid has slices like this picture, and how like are they? |
+//! | [`microgeometry`] | Which relief on this mesh has the contact distribution of that picture? |
 //!
 //! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.
 //!
@@ -55,6 +56,8 @@ pub use stereology_exemplar as exemplar;
 pub use stereology_grid as grid;
 #[cfg(feature = "kmatrix")]
 pub use stereology_kmatrix as kmatrix;
+#[cfg(feature = "microgeometry")]
+pub use stereology_microgeometry as microgeometry;
 #[cfg(feature = "pyramid")]
 pub use stereology_pyramid as pyramid;
 #[cfg(feature = "render")]

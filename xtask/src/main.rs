@@ -6,6 +6,7 @@ mod figures;
 mod grown_stones;
 mod label_scores;
 mod particle_noise;
+mod relief_table;
 mod renderer_check;
 mod sample;
 mod sand;
@@ -31,15 +32,15 @@ enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
     /// Runs the released program on photographs outside the project and writes docs/acceptance.md, and synthesises textures
-    /// outside the project and writes the table of docs/texture.md
+    /// outside the project and writes the table of docs/texture.md; likewise reliefs and docs/microgeometry.md
     Acceptance {
-        /// Folder that holds images/ and textures/
+        /// Folder that holds images/, textures/, meshes/ and exemplars/
         #[arg(long)]
         data: PathBuf,
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
-        /// Only this part: photographs, textures, noise, renderer, grow or measure
+        /// Only this part: photographs, textures, noise, reliefs, renderer, grow or measure
         #[arg(long)]
         only: Option<String>,
         /// Python that has mitsuba, against which the renderer is held; without it that part is left out
@@ -82,8 +83,8 @@ fn main() -> Result<()> {
             python,
         } => {
             let wanted = |part: &str| only.as_deref().is_none_or(|only| only == part);
+            let program = root()?.join("target/release/stereology");
             if wanted("photographs") {
-                let program = root()?.join("target/release/stereology");
                 acceptance::run(&program, &data, &results, &root()?.join("docs/acceptance.md"))?;
             }
             let page = root()?.join("docs/texture.md");
@@ -93,15 +94,15 @@ fn main() -> Result<()> {
             if wanted("noise") {
                 particle_noise::run(&data.join("images"), &page)?;
             }
-            if wanted("grow") || wanted("measure") {
-                let program = root()?.join("target/release/stereology");
-                let program = std::env::var_os("STEREOLOGY").map_or(program, PathBuf::from);
-                if wanted("grow") {
-                    grown_stones::grow(&program, &data, &results, &root()?.join("docs/grow.md"))?;
-                }
-                if wanted("measure") {
-                    grown_stones::measure(&program, &data, &results, &root()?.join("docs/measure.md"))?;
-                }
+            if wanted("grow") {
+                grown_stones::grow(&program, &data, &results, &root()?.join("docs/grow.md"))?;
+            }
+            if wanted("measure") {
+                grown_stones::measure(&program, &data, &results, &root()?.join("docs/measure.md"))?;
+            }
+            if wanted("reliefs") {
+                let page = root()?.join("docs/microgeometry.md");
+                relief_table::run(&program, &data, &results.join("reliefs"), &page)?;
             }
             if let Some(python) = python.filter(|_| wanted("renderer")) {
                 renderer_check::run(&python, &results.join("renderer"))?;

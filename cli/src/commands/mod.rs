@@ -1,7 +1,10 @@
 //! The commands, one module each.
 
 pub mod carve;
+pub mod contact;
+pub mod displace;
 pub mod exemplar;
+pub mod explore;
 pub mod export;
 pub mod grow;
 pub mod kmatrix;
@@ -17,9 +20,7 @@ pub mod synthesize;
 pub mod texture;
 pub mod unfold;
 
-use std::ffi::OsString;
-
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -57,31 +58,16 @@ pub enum Command {
     Measure(measure::Measure),
     Exemplar(exemplar::Exemplar),
     Grow(grow::Grow),
-    /// Not available yet: contact distributions of a microgeometry
-    Contact(Later),
-    /// Not available yet: stochastic displacement of a mesh
-    Displace(Later),
-    /// Not available yet: a solid explored interactively
-    Explore(Later),
+    Contact(contact::Contact),
+    Displace(displace::Displace),
+    Explore(explore::Explore),
     /// Prints docs/cli.md
     #[command(hide = true)]
     Manual,
 }
 
-/// Arguments of a command that is not built yet: anything.
-#[derive(Args, Debug)]
-pub struct Later {
-    /// Not read yet
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-    rest: Vec<OsString>,
-}
-
 /// Runs a command; `None` if it has printed its answer itself.
 pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>, Failure> {
-    let later = |name: &str, later: &Later| {
-        let _ = &later.rest;
-        Err(Failure::not_available(format!("the command `{name}`")))
-    };
     match command {
         Command::Synthesize(options) => options.run(everywhere).map(Some),
         Command::Segment(options) => options.run(everywhere).map(Some),
@@ -98,9 +84,9 @@ pub fn run(command: &Command, everywhere: &Everywhere) -> Result<Option<Answer>,
         Command::Measure(options) => options.run(everywhere).map(Some),
         Command::Exemplar(options) => options.run(everywhere).map(Some),
         Command::Grow(options) => options.run(everywhere).map(Some),
-        Command::Contact(rest) => later("contact", rest),
-        Command::Displace(rest) => later("displace", rest),
-        Command::Explore(rest) => later("explore", rest),
+        Command::Contact(options) => options.run(everywhere).map(Some),
+        Command::Displace(options) => options.run(everywhere).map(Some),
+        Command::Explore(options) => options.run(everywhere).map(Some),
         Command::Manual => {
             use std::io::Write;
             let _ = std::io::stdout().write_all(manual::page().as_bytes());

@@ -5,6 +5,7 @@
 mod bad_input;
 mod contract;
 mod packings;
+mod reliefs;
 mod small_commands;
 mod solid;
 mod stones;

@@ -1,4 +1,4 @@
-//! The paper's figures, drawn again from this workspace: pictures and tables under docs/figures.
+//! The papers' figures, drawn again from this workspace: pictures and tables under docs/figures.
 
 mod bars;
 mod carvings;
@@ -10,6 +10,7 @@ mod growing;
 mod materials;
 mod packings;
 mod particles;
+mod reliefs;
 mod scenes;
 mod section_likelihood;
 mod solids;
@@ -24,7 +25,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 20] = [
+    let figures: [(&str, Figure); 21] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -44,6 +45,7 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("packing", packings::draw),
         ("texture", textures::draw),
         ("grow", growing::draw),
+        ("microgeometry", reliefs::draw),
         ("readme", solids::draw_readme),
     ];
     for (name, draw) in figures {

@@ -1,0 +1,226 @@
+//! `stereology contact`: contact distributions from pictures, volumes, formulas and files.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use ndarray::{Array2, Array3, ArrayD, Ix3};
+use serde_json::{Value, json};
+use stereology::grid::read_npy;
+use stereology::microgeometry::{
+    self, ContactDistribution, EstimateOptions, Law, contact_of_picture, contact_of_volume, otsu,
+};
+use stereology::segment::{read_labels, read_photo};
+
+use crate::answer::Answer;
+use crate::arguments::Everywhere;
+use crate::failure::{Explain, Failure};
+use crate::outputs::{check_file, write_text};
+use crate::values::{bins, not_negative, positive};
+
+/// Measures how far the points of two regions lie from the interface between them: the distribution that `stereology displace` puts on meshes
+///
+/// IMAGE is a picture whose light pixels are the positive region and dark ones the negative; the threshold is Otsu's unless given. It may also be a volume (.npy, axes z, y, x: pores and material), a label map (--labels), or a contact distribution to edit (.json).
+/// Without IMAGE the distribution is made from formulas (--negative-law, --positive-law): uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION.
+///
+/// Distances are measured from the interface, which runs half way between pixels; what the picture's border hides is estimated. --counting paper does as Schroeder et al. 2005 did: from pixel to pixel, in whole pixels, borders ignored.
+#[derive(Args, Debug)]
+#[command(
+    after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology contact --negative-law exponential:2 --positive-law disc:6 --share 0.4 -o cells.json\n          stereology contact gravel.png --edit 5=0 --edit -1=0.2 -o edited.json"
+)]
+pub struct Contact {
+    /// Picture, volume (.npy), label map, or a contact distribution (.json)
+    #[arg(value_name = "IMAGE", required_unless_present = "positive_law")]
+    pub image: Option<PathBuf>,
+    /// Grey value, 0 to 255: pixels above it are positive [default: Otsu's]
+    #[arg(long, value_name = "T", value_parser = threshold)]
+    pub threshold: Option<f64>,
+    /// IMAGE is a label map: all labels but 0 are positive
+    #[arg(long, conflicts_with = "threshold")]
+    pub labels: bool,
+    /// Bins of the region with the largest distance [default: a pixel each]
+    #[arg(long, value_name = "N", value_parser = bins)]
+    pub bins: Option<usize>,
+    /// Side of a pixel in distribution units
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
+    pub pixel_size: f64,
+    /// How distances are counted
+    #[arg(long, value_enum, default_value_t = Counting::Interface)]
+    pub counting: Counting,
+    /// Exchange the regions
+    #[arg(long)]
+    pub invert: bool,
+    /// Give a bin another share before all are normalised: 0, 1, ... positive region, -1, -2, ... negative
+    #[arg(long, value_name = "BIN=SHARE", value_parser = edit, allow_hyphen_values = true)]
+    pub edit: Vec<(i64, f64)>,
+    /// Law of the negative region's distances, without IMAGE
+    #[arg(long, value_name = "LAW", requires = "positive_law", conflicts_with = "image")]
+    pub negative_law: Option<Law>,
+    /// Law of the positive region's distances, without IMAGE
+    #[arg(long, value_name = "LAW", requires = "negative_law", conflicts_with = "image")]
+    pub positive_law: Option<Law>,
+    /// Share of the positive region, with laws
+    #[arg(long, value_name = "PHI", default_value_t = 0.5, value_parser = crate::values::share)]
+    pub share: f64,
+    /// File for the distribution: .json
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+/// How distances are counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Counting {
+    /// From the interface; what the border hides is estimated
+    Interface,
+    /// From the interface, as seen: for pictures of the whole structure
+    Seen,
+    /// From pixel to pixel in whole pixels, as in the paper
+    Paper,
+}
+
+fn threshold(text: &str) -> Result<f64, String> {
+    not_negative(text)
+        .ok()
+        .filter(|t| *t < 255.0)
+        .ok_or_else(|| "a grey value from 0 to below 255 is needed".to_owned())
+}
+
+fn edit(text: &str) -> Result<(i64, f64), String> {
+    let parts = text.split_once('=');
+    let parsed = parts.and_then(|(bin, share)| Some((bin.trim().parse().ok()?, not_negative(share).ok()?)));
+    parsed.ok_or_else(|| "a bin and its share are needed, such as 3=0.1 or -1=0".to_owned())
+}
+
+/// What was found besides the distribution.
+struct Source {
+    of: ContactDistribution,
+    threshold: Option<f64>,
+    pixels: Option<usize>,
+}
+
+impl Contact {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        check_file(&self.output, everywhere.force)?;
+        let Source { of, threshold, pixels } = match (&self.image, self.negative_law, self.positive_law) {
+            (Some(image), ..) => self.measure(image)?,
+            (None, Some(negative), Some(positive)) => Source {
+                of: ContactDistribution::from_laws(self.pixel_size, negative, positive, self.share)
+                    .or_usage("--negative-law, --positive-law")?,
+                threshold: None,
+                pixels: None,
+            },
+            _ => return Err(Failure::usage("give an IMAGE, or --negative-law and --positive-law")),
+        };
+        let of = if self.invert { of.inverted() } else { of };
+        let of = self
+            .edit
+            .iter()
+            .try_fold(of, |of, &(bin, share)| of.edited(bin, share))
+            .or_usage("--edit")?;
+        write_text(&self.output, &of.to_json())?;
+        let mut answer = Answer::new("contact");
+        answer
+            .field("bin_width", of.bin_width())
+            .field("negative", of.negative())
+            .field("positive", of.positive())
+            .field("positive_share", of.positive_share())
+            .field("threshold", threshold.map_or(Value::Null, |t| json!(t)))
+            .field("pixels", pixels)
+            .line(format!(
+                "positive region {:.1} %, distances up to {:.4}; negative {:.1} %, up to {:.4} -> {}",
+                100.0 * of.positive_share(),
+                of.positive().len() as f64 * of.bin_width(),
+                100.0 - 100.0 * of.positive_share(),
+                of.negative().len() as f64 * of.bin_width(),
+                self.output.display()
+            ));
+        if let Some(threshold) = threshold {
+            answer.line(format!("grey values above {threshold} are positive"));
+        }
+        Ok(answer)
+    }
+
+    fn measure(&self, image: &Path) -> Result<Source, Failure> {
+        let options = EstimateOptions {
+            counting: match self.counting {
+                Counting::Interface => microgeometry::Counting::Interface,
+                Counting::Seen => microgeometry::Counting::InterfaceSeen,
+                Counting::Paper => microgeometry::Counting::Paper,
+            },
+            pixel_size: self.pixel_size,
+            bins: self.bins,
+        };
+        let ends_in = |ending: &str| image.extension().is_some_and(|of| of.eq_ignore_ascii_case(ending));
+        if ends_in("json") {
+            return Ok(Source {
+                of: read_contact(image)?,
+                threshold: None,
+                pixels: None,
+            });
+        }
+        if self.labels {
+            let map = read_labels(image).at(image)?;
+            let of = contact_of_picture(map.mapv(|label| label != 0).view(), &options).at(image)?;
+            return Ok(Source {
+                of,
+                threshold: None,
+                pixels: Some(map.len()),
+            });
+        }
+        if ends_in("npy") {
+            let grey = volume(image)?;
+            let threshold = self.threshold_for(grey.iter().copied(), image)?;
+            let of = contact_of_volume(grey.mapv(|v| f64::from(v) > threshold).view(), &options).at(image)?;
+            return Ok(Source {
+                of,
+                threshold: Some(threshold),
+                pixels: Some(grey.len()),
+            });
+        }
+        let photo = read_photo(image).at(image)?;
+        let grey = Array2::from_shape_fn((photo.height() as usize, photo.width() as usize), |(y, x)| {
+            let [r, g, b] = photo.get_pixel(x as u32, y as u32).0.map(f64::from);
+            (0.299 * r + 0.587 * g + 0.114 * b).round() as u8
+        });
+        let threshold = self.threshold_for(grey.iter().copied(), image)?;
+        let of = contact_of_picture(grey.mapv(|v| f64::from(v) > threshold).view(), &options).at(image)?;
+        Ok(Source {
+            of,
+            threshold: Some(threshold),
+            pixels: Some(grey.len()),
+        })
+    }
+
+    fn threshold_for(&self, values: impl Iterator<Item = u8>, image: &Path) -> Result<f64, Failure> {
+        match self.threshold {
+            Some(threshold) => Ok(threshold),
+            None => otsu(values)
+                .map(f64::from)
+                .ok_or("all pixels have one grey value: there are no two regions to measure distances between")
+                .at(image),
+        }
+    }
+}
+
+/// A contact distribution from its file.
+pub fn read_contact(path: &Path) -> Result<ContactDistribution, Failure> {
+    let text = std::fs::read_to_string(path).at(path)?;
+    ContactDistribution::from_json(&text).at(path)
+}
+
+/// Grey values of a volume: u8 as they are, other types stretched from their least to their largest value.
+fn volume(path: &Path) -> Result<Array3<u8>, Failure> {
+    let three = |n: usize| format!("has {n} axes; a volume has three: z, y, x");
+    let grey: ArrayD<u8> = match read_npy::<u8>(path) {
+        Ok(grey) => grey,
+        Err(error) => match read_npy::<f32>(path) {
+            Ok(values) => {
+                let finite = || values.iter().copied().filter(|v| v.is_finite());
+                let (low, high) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
+                values.mapv(|v| ((v - low) / (high - low) * 255.0).clamp(0.0, 255.0) as u8)
+            }
+            Err(_) => return Err(error).at(path),
+        },
+    };
+    let axes = grey.ndim();
+    grey.into_dimensionality::<Ix3>().map_err(|_| three(axes)).at(path)
+}

@@ -1,0 +1,404 @@
+//! `stereology displace`: stochastic relief on a mesh.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use stereology::grid::write_atomically;
+use stereology::microgeometry::{
+    Design, EdgeCensus, Method, Metric, MicrogeometryError, Offset, ReconstructOptions, Reconstruction, Weighting,
+    displace, presets, reconstruct, refined, simplified, to_distribution_units,
+};
+use stereology::shape::{
+    ColouredMesh, MeshFormat, Subdivision, TriangleMesh, corner_normals, read_mesh, self_intersections,
+    write_coloured_mesh, write_mesh,
+};
+
+use crate::answer::Answer;
+use crate::arguments::Everywhere;
+use crate::commands::contact::read_contact;
+use crate::failure::{Explain, Failure};
+use crate::numbers::counted;
+use crate::outputs::{check_file, write_text};
+use crate::progress::Step;
+use crate::values::{count, positive};
+use crate::warnings::Warning;
+
+/// Puts a random relief on a mesh whose distances from ridge to valley are distributed as in a picture
+///
+/// MESH (.obj, .ply, .stl; closed or not, in one piece or several) is scaled so that its longest box side is 2 U units of the contact distribution. Every triangle gets a signed distance to the interface between two regions (a label), so that
+/// labels are distributed as FILE says and no two differ by more than the distance over the surface; vertices then move along their normals by s k f(|label|) halves of the longest box side. Another --seed is another relief of the same kind.
+///
+/// The mesh must be fine enough for the relief: edges about as long as a bin is wide (--edge-length). S,K,F is a direction (out, in, none), a scale (0.01 to 0.05 are usual) and a profile: x (sharp), sqrt (rounded), or a table such as 0=0;2=0;3=1.
+#[derive(Args, Debug)]
+#[command(
+    after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology displace bust.obj --contact contact.json --units 60 --negative in,0.02,sqrt --positive out,0.03,sqrt -o relief.glb\n          stereology displace bust.obj --contact contact.json --preset fig8-coral -o coral.ply\n          stereology displace vase.obj --design design.json --seed 7 -o vase7.glb"
+)]
+pub struct Displace {
+    /// Mesh to displace
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// Contact distribution, written by `stereology contact`
+    #[arg(long, value_name = "FILE", required_unless_present = "design")]
+    pub contact: Option<PathBuf>,
+    /// Half the mesh's longest box side in distribution units: more units, finer structure
+    #[arg(long, value_name = "U", required_unless_present_any = ["design", "preset"], value_parser = positive)]
+    pub units: Option<f64>,
+    /// A design of `stereology explore` or --design-out: everything in one file; other options overrule it
+    #[arg(long, value_name = "JSON")]
+    pub design: Option<PathBuf>,
+    /// Units and offsets of a row of the paper's table 1; a wrong name lists them
+    #[arg(long, value_name = "NAME", conflicts_with = "design")]
+    pub preset: Option<String>,
+    /// How labels are given [default: tight]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodArgument>,
+    /// Displacement of the negative region [default: in,0.02,sqrt]
+    #[arg(long, value_name = "S,K,F", allow_hyphen_values = true)]
+    pub negative: Option<Offset>,
+    /// Displacement of the positive region [default: out,0.03,sqrt]
+    #[arg(long, value_name = "S,K,F", allow_hyphen_values = true)]
+    pub positive: Option<Offset>,
+    /// Split triangles until no edge is longer, in mesh units
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub edge_length: Option<f64>,
+    /// How triangles are split
+    #[arg(long, value_enum, default_value_t = Scheme::Midpoint)]
+    pub subdivision: Scheme,
+    /// What a triangle counts for [default: area; count for --method paper]
+    #[arg(long, value_enum)]
+    pub weight: Option<Weight>,
+    /// Draw structures out: an axis and how many times as long they are along it as across
+    #[arg(long, value_name = "X,Y,Z,FACTOR", value_parser = stretch, allow_hyphen_values = true)]
+    pub stretch: Option<([f64; 3], f64)>,
+    /// Simplify the result to so many triangles, small ones where the relief is rich
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub triangles: Option<usize>,
+    /// Colours of the vertices, in .glb and .ply
+    #[arg(long, value_enum, default_value_t = Colours::None)]
+    pub colours: Colours,
+    /// File for the labels: triangle, label
+    #[arg(long, value_name = "CSV")]
+    pub labels_out: Option<PathBuf>,
+    /// File for the design: all choices made, to be used again with --design
+    #[arg(long, value_name = "JSON")]
+    pub design_out: Option<PathBuf>,
+    /// File: .obj, .ply, .glb or .stl
+    #[arg(short, long, value_name = "MESH")]
+    pub output: PathBuf,
+}
+
+/// How labels are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MethodArgument {
+    /// Looks ahead and packs tightly
+    Tight,
+    /// To the letter of the paper
+    Paper,
+}
+
+/// How triangles are split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scheme {
+    /// At the middles of edges that are too long: the same surface
+    Midpoint,
+    /// By Loop's scheme, which rounds the mesh
+    Loop,
+}
+
+/// What a triangle counts for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Weight {
+    /// Its area
+    Area,
+    /// One, as in the paper
+    Count,
+}
+
+/// Colours of vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Colours {
+    /// Grey
+    None,
+    /// Red and blue: positive and negative
+    Region,
+    /// From blue through white to red, by the label
+    Label,
+}
+
+fn stretch(text: &str) -> Result<([f64; 3], f64), String> {
+    let numbers: Result<Vec<f64>, String> = text.split(',').map(crate::values::finite).collect();
+    match numbers?[..] {
+        [x, y, z, factor] if factor > 0.0 && x.hypot(y).hypot(z) > 0.0 => Ok(([x, y, z], factor)),
+        _ => Err("an axis and a factor above zero are needed, such as 0,1,0,4".to_owned()),
+    }
+}
+
+impl Displace {
+    pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        let began = Instant::now();
+        let is_glb = ends_in(&self.output, "glb");
+        if !is_glb {
+            MeshFormat::from_path(&self.output).or_usage("-o (or .glb)")?;
+        }
+        if self.colours != Colours::None && !is_glb && !ends_in(&self.output, "ply") {
+            return Err(Failure::usage("--colours need a file that ends in .glb or .ply"));
+        }
+        let files = [Some(&self.output), self.labels_out.as_ref(), self.design_out.as_ref()];
+        for file in files.into_iter().flatten() {
+            check_file(file, everywhere.force)?;
+        }
+        let design = self.choices(everywhere)?;
+        let mut mesh = read_mesh(&self.mesh).at(&self.mesh)?;
+        mesh.weld();
+        if let Some(edge_length) = design.edge_length {
+            // Kept in halves of the box side, so that a design fits any mesh.
+            let scheme = match self.subdivision {
+                Scheme::Midpoint => Subdivision::Midpoint,
+                Scheme::Loop => Subdivision::Loop,
+            };
+            let length = self.edge_length.unwrap_or_else(|| edge_length * half_side(&mesh));
+            mesh = refined(&mesh, scheme, length).at(&self.mesh)?;
+        }
+        let step = Step::begin("labels", everywhere.quiet);
+        let made = self.labels(&mesh, &design, &|done| step.at(done))?;
+        drop(step);
+        let displaced = displace(&mesh, &made.labels, &design.negative, &design.positive).at(&self.mesh)?;
+        let (mut relief, mut values) = (displaced.mesh, displaced.values);
+        if let Some(most) = self.triangles {
+            let simple = simplified(&relief, &values, most);
+            (relief, values) = (simple.mesh, simple.values);
+        }
+        crate::progress::go_on()?;
+        if let Some(path) = &self.labels_out {
+            write_labels(path, &made.labels)?;
+        }
+        if let Some(path) = &self.design_out {
+            let mut design = design.clone();
+            if let Some(length) = self.edge_length {
+                design.edge_length = Some(length / half_side(&mesh));
+            }
+            write_text(path, &design.to_json())?;
+        }
+        self.write(
+            &relief,
+            &values,
+            design.contact.positive().len().max(1) as f64 * design.contact.bin_width(),
+        )?;
+        let census = EdgeCensus::of(&mesh);
+        let crossings = self_intersections(&relief);
+        Ok(self.tell(&made, &relief, census, crossings, began))
+    }
+
+    /// What is to be made: from the design, the preset, and the options, of which the later overrule the earlier.
+    fn choices(&self, everywhere: &Everywhere) -> Result<Design, Failure> {
+        let preset = match &self.preset {
+            None => None,
+            Some(name) => {
+                let all = presets();
+                let names: Vec<&str> = all.iter().map(|preset| preset.name).collect();
+                let names = names.join(", ");
+                let found = all.into_iter().find(|preset| preset.name == name.as_str());
+                Some(found.ok_or_else(|| Failure::usage(format!("--preset {name}: there are {names}")))?)
+            }
+        };
+        let mut design = match (&self.design, &self.contact) {
+            (Some(path), _) => {
+                let text = std::fs::read_to_string(path).at(path)?;
+                Design::from_json(&text).at(path)?
+            }
+            (None, Some(path)) => {
+                let offset = |text: &str| text.parse::<Offset>().or_fail();
+                let mut design = Design::new(
+                    read_contact(path)?,
+                    1.0,
+                    offset("in,0.02,sqrt")?,
+                    offset("out,0.03,sqrt")?,
+                );
+                design.seed = everywhere.seed;
+                design
+            }
+            (None, None) => return Err(Failure::usage("give --contact FILE or --design JSON")),
+        };
+        if let (Some(_), Some(path)) = (&self.design, &self.contact) {
+            design.contact = read_contact(path)?;
+        }
+        if let Some(preset) = preset {
+            (design.units, design.negative, design.positive) = (preset.units, preset.negative, preset.positive);
+        }
+        if everywhere.seed != 0 {
+            design.seed = everywhere.seed;
+        }
+        let overrule = |to: &mut Offset, by: &Option<Offset>| {
+            if let Some(by) = by {
+                *to = by.clone();
+            }
+        };
+        overrule(&mut design.negative, &self.negative);
+        overrule(&mut design.positive, &self.positive);
+        design.units = self.units.unwrap_or(design.units);
+        design.edge_length = self.edge_length.or(design.edge_length);
+        design.stretch = self.stretch.or(design.stretch);
+        match self.method {
+            Some(MethodArgument::Tight) => design.method = Method::Tight,
+            Some(MethodArgument::Paper) => design.method = Method::Paper,
+            None => {}
+        }
+        Ok(design)
+    }
+
+    fn labels(
+        &self,
+        mesh: &TriangleMesh,
+        design: &Design,
+        progress: &(dyn Fn(f64) -> std::ops::ControlFlow<()> + Sync),
+    ) -> Result<Reconstruction, Failure> {
+        let scaled = to_distribution_units(mesh, design.units).at(&self.mesh)?;
+        let mut options = ReconstructOptions::default()
+            .with_method(design.method)
+            .with_seed(design.seed);
+        options.weighting = self.weight.map(|weight| match weight {
+            Weight::Area => Weighting::Area,
+            Weight::Count => Weighting::Count,
+        });
+        if let Some((axis, factor)) = design.stretch {
+            options.metric = Metric::along(axis.into(), factor).or_usage("--stretch")?;
+        }
+        reconstruct(&scaled, &design.contact, &options, progress).map_err(|error| match error {
+            MicrogeometryError::Cancelled => Failure::stopped(),
+            error => Failure::run(format!("{}: {error}", self.mesh.display())),
+        })
+    }
+
+    fn write(&self, relief: &TriangleMesh, values: &[f64], far: f64) -> Result<(), Failure> {
+        if self.colours == Colours::None && !ends_in(&self.output, "glb") {
+            return write_mesh(&self.output, relief).at(&self.output);
+        }
+        let coloured = ColouredMesh {
+            normals: corner_normals(relief),
+            colours: values.iter().map(|&x| self.colours.of(x, far)).collect(),
+            mesh: relief.clone(),
+        };
+        write_coloured_mesh(&self.output, &coloured).at(&self.output)
+    }
+
+    fn tell(
+        &self,
+        made: &Reconstruction,
+        relief: &TriangleMesh,
+        census: EdgeCensus,
+        crossings: usize,
+        began: Instant,
+    ) -> Answer {
+        let mut answer = Answer::new("displace");
+        let shortfalls: Vec<_> = made
+            .shortfalls
+            .iter()
+            .map(|short| json!({"bin": short.bin, "wanted": short.wanted, "got": short.got}))
+            .collect();
+        answer
+            .field("triangles", made.labels.len())
+            .field("triangles_written", relief.triangles.len())
+            .field("left_over_fraction", made.left_over)
+            .field("misplaced_fraction", made.misplaced)
+            .field("violations", made.violations)
+            .field("emd_labels", made.emd_labels)
+            .field("emd_measured", made.emd_measured)
+            .field("shortfalls", shortfalls)
+            .field("pieces", made.pieces)
+            .field("border_edges", census.border)
+            .field("crowded_edges", census.crowded)
+            .field("self_intersections", crossings)
+            .seconds(began.elapsed().as_secs_f64())
+            .line(format!(
+                "{} triangles labelled, {:.2} % left over, {:.2} % of the labels in another bin than asked for; labels {:.3} bins from the distribution, distances measured again {}",
+                counted(made.labels.len() as u64),
+                100.0 * made.left_over,
+                100.0 * made.misplaced,
+                made.emd_labels,
+                made.emd_measured.map_or_else(|| "none: one region only".to_owned(), |emd| format!("{emd:.3}")),
+            ))
+            .line(format!(
+                "{} triangles written to {}",
+                counted(relief.triangles.len() as u64),
+                self.output.display()
+            ));
+        if census.border > 0 {
+            answer.line(format!(
+                "the mesh is open: {} edges have one triangle; distances end there",
+                counted(census.border as u64)
+            ));
+        }
+        if made.pieces > 1 {
+            answer.line(format!(
+                "{} pieces, each with its share of the distribution",
+                made.pieces
+            ));
+        }
+        if census.crowded > 0 {
+            answer.warn(Warning::new(
+                "crowded-edges",
+                format!("{} edges have more than two triangles", census.crowded),
+            ));
+        }
+        if crossings > 0 {
+            let at_least = if crossings >= 1000 { "at least " } else { "" };
+            answer.warn(Warning::new(
+                "sharp-relief",
+                format!("{at_least}{crossings} pairs of triangles of the displaced mesh cross each other"),
+            ));
+        }
+        if made.misplaced > TELL {
+            answer.warn(Warning::new(
+                "unrealisable-distribution",
+                format!(
+                    "{:.1} % of the labels are not in the bins the distribution asks for; the first that could not be filled is bin {}",
+                    100.0 * made.misplaced,
+                    made.shortfalls.first().map_or(0, |short| short.bin)
+                ),
+            ));
+        }
+        answer
+    }
+}
+
+/// Share of labels in other bins from which it is told.
+const TELL: f64 = 0.02;
+
+impl Colours {
+    /// Colour of a vertex with value `x`, where `far` is as far from the interface as it goes.
+    fn of(self, x: f64, far: f64) -> [f32; 4] {
+        let share = (x.abs() / far).sqrt().min(1.0) as f32;
+        let [r, g, b] = match (self, x < 0.0) {
+            (Self::None, _) => [0.75, 0.73, 0.7],
+            (Self::Region, true) => [0.22, 0.36, 0.62],
+            (Self::Region, false) => [0.78, 0.3, 0.22],
+            (Self::Label, true) => [1.0 - 0.8 * share, 1.0 - 0.65 * share, 1.0 - 0.3 * share],
+            (Self::Label, false) => [1.0 - 0.2 * share, 1.0 - 0.8 * share, 1.0 - 0.85 * share],
+        };
+        [r, g, b, 1.0]
+    }
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|of| of.eq_ignore_ascii_case(ending))
+}
+
+/// Half the longest box side; 1 for a mesh without extent, which is refused later.
+fn half_side(mesh: &TriangleMesh) -> f64 {
+    let side = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).max());
+    if side > 0.0 { 0.5 * side } else { 1.0 }
+}
+
+fn write_labels(path: &Path, labels: &[f64]) -> Result<(), Failure> {
+    write_atomically(path, |out| {
+        writeln!(out, "triangle,label")?;
+        for (triangle, label) in labels.iter().enumerate() {
+            writeln!(out, "{triangle},{label}")?;
+        }
+        Ok(())
+    })
+    .at(path)
+}

@@ -1,0 +1,199 @@
+//! What the labels given so far allow the other triangles: lower and upper bounds, spread over the surface as far as they matter.
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "triangles and levels are numbered in 32 bits"
+)]
+
+use std::collections::BinaryHeap;
+
+use crate::budget::Levels;
+use crate::dual::{DualGraph, rank};
+
+/// One region while its labels are given, seen as if it were the positive one: the negative region's labels and bounds have their signs changed.
+///
+/// `bound[i]` = max over the region's labels of x − d, the least that triangle i can have. A triangle with bound in level q, and none given above, must get a label of level q: it is *forced*, and takes room there.
+pub(crate) struct Region<'a> {
+    graph: &'a DualGraph,
+    weights: &'a [i64],
+    /// Height of a level.
+    height: f64,
+    pub(crate) bound: Vec<f64>,
+    /// Level + 1 in which the triangle is counted as forced; 0: none.
+    counted: Vec<u32>,
+    /// Weight forced into each level.
+    forced: Vec<i64>,
+    /// Triangles that came to be forced into each level; some have left it since.
+    came: Vec<Vec<u32>>,
+    /// What a level may be overfilled by.
+    tolerance: i64,
+    queue: BinaryHeap<(u64, u32)>,
+    undo: Vec<Change>,
+    /// Steps looked at since this was last set to zero.
+    pub(crate) work: u64,
+}
+
+#[derive(Clone, Copy)]
+struct Change {
+    triangle: u32,
+    counted: u32,
+    bound: f64,
+}
+
+/// How much may be forced into each level.
+pub(crate) struct Limit<'a> {
+    pub(crate) room: &'a Levels,
+    /// Levels below this one may take room that is left above them, and of it that much; 0: none may.
+    pub(crate) below: usize,
+    pub(crate) spare: i64,
+}
+
+/// A region whose seeds would force more triangles into a level than it has room for.
+pub(crate) struct Overfull;
+
+impl<'a> Region<'a> {
+    pub(crate) fn new(graph: &'a DualGraph, weights: &'a [i64], height: f64, levels: usize, tolerance: i64) -> Self {
+        Self {
+            graph,
+            weights,
+            height,
+            bound: vec![f64::NEG_INFINITY; graph.len()],
+            counted: vec![0; graph.len()],
+            forced: vec![0; levels],
+            came: vec![Vec::new(); levels],
+            tolerance,
+            queue: BinaryHeap::new(),
+            undo: Vec::new(),
+            work: 0,
+        }
+    }
+
+    /// Forgets what was counted, for the next piece of the mesh.
+    pub(crate) fn clear_counts(&mut self) {
+        self.forced.fill(0);
+        self.came.iter_mut().for_each(Vec::clear);
+    }
+
+    /// The unlabelled triangles that must be given a label of this level, most extreme first.
+    pub(crate) fn forced_into(&mut self, level: usize, labelled: &[bool]) -> Vec<u32> {
+        let mut come = std::mem::take(&mut self.came[level]);
+        come.retain(|&t| !labelled[t as usize] && self.counted[t as usize] as usize == level + 1);
+        let bound = &self.bound;
+        come.sort_unstable_by(|&a, &b| bound[b as usize].total_cmp(&bound[a as usize]).then(a.cmp(&b)));
+        come.dedup();
+        come
+    }
+
+    /// A triangle has got its label, and is no longer to be counted as forced.
+    pub(crate) fn settle(&mut self, t: u32) {
+        let counted = std::mem::replace(&mut self.counted[t as usize], 0);
+        if counted > 0 {
+            self.forced[counted as usize - 1] -= self.weights[t as usize];
+        }
+    }
+
+    /// Labels the triangles `seeds` with `value` and spreads that as far as bounds above `floor` go. Nothing happens and [`Overfull`] is told if that forced more into a level than `limit` lets.
+    pub(crate) fn spread(
+        &mut self,
+        seeds: &[u32],
+        value: f64,
+        floor: f64,
+        labelled: &mut [bool],
+        limit: &Limit<'_>,
+    ) -> Result<(), Overfull> {
+        self.queue.clear();
+        self.undo.clear();
+        for &t in seeds {
+            self.raise(t, value);
+            self.settle(t);
+            labelled[t as usize] = true;
+        }
+        while let Some((key, t)) = self.queue.pop() {
+            let value = self.bound[t as usize];
+            if rank(value) != key {
+                continue;
+            }
+            // Values come in falling order: who leaves a level for a higher one has left before others come.
+            if value >= 0.0 && !labelled[t as usize] {
+                let level = (value / self.height) as usize;
+                let counted = self.counted[t as usize] as usize;
+                if counted != level + 1 {
+                    let weight = self.weights[t as usize];
+                    if counted > 0 {
+                        self.forced[counted - 1] -= weight;
+                    }
+                    self.forced[level] += weight;
+                    self.counted[t as usize] = level as u32 + 1;
+                    self.came[level].push(t);
+                    if !self.fits(level, limit) {
+                        return self.refuse(seeds, labelled);
+                    }
+                }
+            }
+            let links = self.graph.links(t as usize);
+            self.work += links.len() as u64;
+            for link in links {
+                let there = value - link.length;
+                if there > self.bound[link.to as usize] && there > floor {
+                    self.raise(link.to, there);
+                }
+            }
+        }
+        if limit.below > 0 && (0..limit.below).any(|level| !self.fits(level, limit)) {
+            return self.refuse(seeds, labelled);
+        }
+        Ok(())
+    }
+
+    /// Has the level room for what is forced into it, if need be with what the levels above hand down?
+    fn fits(&self, level: usize, limit: &Limit<'_>) -> bool {
+        let over = |q: usize| self.forced[q] - limit.room[q];
+        if over(level) <= self.tolerance {
+            return true;
+        }
+        let handed: i64 = (level..limit.below).map(over).sum();
+        limit.below > level && handed <= limit.spare + self.tolerance
+    }
+
+    fn refuse(&mut self, seeds: &[u32], labelled: &mut [bool]) -> Result<(), Overfull> {
+        self.take_back();
+        for &seed in seeds {
+            labelled[seed as usize] = false;
+        }
+        Err(Overfull)
+    }
+
+    fn raise(&mut self, t: u32, value: f64) {
+        if value > self.bound[t as usize] {
+            self.undo.push(Change {
+                triangle: t,
+                counted: self.counted[t as usize],
+                bound: self.bound[t as usize],
+            });
+            self.bound[t as usize] = value;
+            self.queue.push((rank(value), t));
+        }
+    }
+
+    fn take_back(&mut self) {
+        while let Some(Change {
+            triangle,
+            counted,
+            bound,
+        }) = self.undo.pop()
+        {
+            let t = triangle as usize;
+            let now = self.counted[t];
+            if now != counted {
+                let weight = self.weights[t];
+                if now > 0 {
+                    self.forced[now as usize - 1] -= weight;
+                }
+                if counted > 0 {
+                    self.forced[counted as usize - 1] += weight;
+                }
+                self.counted[t] = counted;
+            }
+            self.bound[t] = bound;
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! Random points of the parameter space (section 5.1 of the paper): designs to look at.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::contact::ContactDistribution;
+use crate::design::Design;
+use crate::displacement::{Direction, Offset, Profile};
+use crate::error::MicrogeometryError;
+use crate::families::Law;
+
+/// Where designs are drawn from. What is `Some` is the same in all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exploration {
+    /// The contact distribution; `None`: drawn too, a blend of two laws in each region.
+    pub contact: Option<ContactDistribution>,
+    /// Scale units, drawn evenly in their logarithm; table 1 has 27 to 82.
+    pub units: [f64; 2],
+    /// Typical distances of the laws, in bins, drawn evenly in their logarithm.
+    pub lengths: [f64; 2],
+    /// Share of the positive region.
+    pub shares: [f64; 2],
+    /// k, drawn evenly in its logarithm, for the profile √x; a third of it for x, which rises higher.
+    pub scales: [f64; 2],
+    /// Displacement of the negative region.
+    pub negative: Option<Offset>,
+    /// Displacement of the positive region.
+    pub positive: Option<Offset>,
+}
+
+impl Default for Exploration {
+    /// Units 25 to 85, distances 0.7 to 6 bins, shares 0.15 to 0.85, k 0.008 to 0.05.
+    fn default() -> Self {
+        Self {
+            contact: None,
+            units: [25.0, 85.0],
+            lengths: [0.7, 6.0],
+            shares: [0.15, 0.85],
+            scales: [0.008, 0.05],
+            negative: None,
+            positive: None,
+        }
+    }
+}
+
+impl Exploration {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    ///
+    /// [`MicrogeometryError::Parameter`] naming a range that is not two positive finite numbers in order, or shares outside 0..1.
+    pub fn check(&self) -> Result<(), MicrogeometryError> {
+        for (name, [low, high]) in [
+            ("units", self.units),
+            ("lengths", self.lengths),
+            ("shares", self.shares),
+            ("scales", self.scales),
+        ] {
+            let most = if name == "shares" { 1.0 } else { 1e6 };
+            if !(low > 0.0 && low <= high && high <= most) {
+                return Err(MicrogeometryError::Parameter(format!(
+                    "the range of {name} is two numbers above zero, the lower first, at most {most}: not {low},{high}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// The design of this number; the same for the same seed, whatever else is drawn.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Exploration::check`].
+    ///
+    /// ```
+    /// use stereology_microgeometry::Exploration;
+    /// let designs = Exploration::default();
+    /// assert_eq!(designs.design(1, 7)?, designs.design(1, 7)?);
+    /// assert_ne!(designs.design(1, 7)?, designs.design(1, 8)?);
+    /// # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
+    /// ```
+    pub fn design(&self, seed: u64, number: u64) -> Result<Design, MicrogeometryError> {
+        self.check()?;
+        let mut random = stream(seed, number);
+        let units = log_even(&mut random, self.units);
+        let contact = match &self.contact {
+            Some(contact) => contact.clone(),
+            None => self.contact(&mut random)?,
+        };
+        let offsets = [self.offset(&mut random), self.offset(&mut random)];
+        let [mut negative, mut positive] = offsets;
+        if negative.direction == Direction::Still && positive.direction == Direction::Still {
+            positive.direction = Direction::Out;
+        }
+        if let Some(fixed) = &self.negative {
+            negative = fixed.clone();
+        }
+        if let Some(fixed) = &self.positive {
+            positive = fixed.clone();
+        }
+        let mut design = Design::new(contact, units, negative, positive);
+        design.seed = own_seed(seed, number);
+        Ok(design)
+    }
+
+    /// A design near another (a tighter search, section 5.1): units, scales and every bin multiplied by factors exp(±`spread`), directions and profiles as they are.
+    ///
+    /// # Errors
+    ///
+    /// [`MicrogeometryError::Parameter`] if the spread is no positive number.
+    pub fn near(&self, of: &Design, spread: f64, seed: u64, number: u64) -> Result<Design, MicrogeometryError> {
+        if !(spread.is_finite() && spread > 0.0 && spread <= 3.0) {
+            return Err(MicrogeometryError::Parameter(format!(
+                "the spread of a nearby search is above 0 and at most 3, not {spread}"
+            )));
+        }
+        let mut random = stream(seed, number);
+        let mut factor = || (spread * (2.0 * random.random::<f64>() - 1.0)).exp();
+        let mut design = of.clone();
+        design.units *= factor();
+        design.negative.scale *= factor();
+        design.positive.scale *= factor();
+        if self.contact.is_none() {
+            let tilt = [factor(), factor()];
+            let mut vary = |shares: &[f64], tilt: f64| shares.iter().map(|share| share * tilt * factor()).collect();
+            let (negative, positive) = (
+                vary(of.contact.negative(), tilt[0]),
+                vary(of.contact.positive(), tilt[1]),
+            );
+            design.contact = ContactDistribution::new(of.contact.bin_width(), negative, positive)?;
+        }
+        if let Some(fixed) = &self.negative {
+            design.negative = fixed.clone();
+        }
+        if let Some(fixed) = &self.positive {
+            design.positive = fixed.clone();
+        }
+        design.seed = own_seed(seed, number);
+        Ok(design)
+    }
+
+    fn contact(&self, random: &mut ChaCha8Rng) -> Result<ContactDistribution, MicrogeometryError> {
+        let [low, high] = self.shares;
+        let share = low + (high - low) * random.random::<f64>();
+        let one = |random: &mut ChaCha8Rng| {
+            let laws = [self.law(random), self.law(random)];
+            ContactDistribution::from_laws(1.0, laws[0], laws[1], share)
+        };
+        let (first, second) = (one(random)?, one(random)?);
+        first.blended(&second, random.random())
+    }
+
+    fn law(&self, random: &mut ChaCha8Rng) -> Law {
+        let length = log_even(random, self.lengths);
+        match random.random_range(0..5) {
+            0 => Law::Uniform(2.0 * length),
+            1 => Law::Disc(3.0 * length),
+            2 => Law::Exponential(length),
+            3 => Law::Rayleigh(0.8 * length),
+            _ => Law::Bell {
+                mean: length,
+                deviation: 0.4 * length,
+            },
+        }
+    }
+
+    fn offset(&self, random: &mut ChaCha8Rng) -> Offset {
+        let direction = [
+            Direction::Out,
+            Direction::Out,
+            Direction::In,
+            Direction::In,
+            Direction::Still,
+        ][random.random_range(0..5)];
+        let scale = log_even(random, self.scales);
+        let (profile, scale) = if random.random::<f64>() < 0.6 {
+            (Profile::Root, scale)
+        } else {
+            (Profile::Linear, scale / 3.0)
+        };
+        Offset {
+            direction,
+            // Three digits say all there is to say, and read well.
+            scale: (scale * 1e5).round() / 1e5,
+            profile,
+        }
+    }
+}
+
+fn stream(seed: u64, number: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(number);
+    random
+}
+
+/// The seed of a candidate's own reconstruction, never 0.
+fn own_seed(seed: u64, number: u64) -> u64 {
+    seed.wrapping_mul(1_000_003).wrapping_add(number).wrapping_add(1) & ((1 << 53) - 1)
+}
+
+fn log_even(random: &mut ChaCha8Rng, [low, high]: [f64; 2]) -> f64 {
+    low * (high / low).powf(random.random())
+}

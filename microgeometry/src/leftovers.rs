@@ -1,0 +1,57 @@
+//! Triangles that the histogram has no label for get one that breaks no bound.
+
+use crate::dual::{DualGraph, spread};
+
+/// What the labelled triangles allow all others: x is at least max(xₐ − d) and at most min(xₐ + d), two searches from all of them at once.
+///
+/// Any mixture (1 − m) low + m high with one m obeys the bounds between the others too, because both are functions that change by no more than the distance; so does max(low, min(high, f)) of any such function f.
+pub(crate) fn bounds(graph: &DualGraph, labelled: &[bool], labels: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let from = |sign: f64| {
+        let mut bound = vec![f64::NEG_INFINITY; graph.len()];
+        let given = (0..graph.len()).filter(|&t| labelled[t]);
+        #[allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
+        spread(graph, &mut bound, given.map(|t| (t as u32, sign * labels[t])));
+        bound
+    };
+    let upper = from(-1.0).into_iter().map(|bound| -bound).collect();
+    (from(1.0), upper)
+}
+
+/// Rounds in which leftovers take the mean of their neighbours.
+const ROUNDS: usize = 8;
+
+/// The paper's leftovers (section 4.4): the average of the neighbours, as far as the bounds allow. They start half way between their bounds; then each moves to its neighbours' mean within what these allow now, which breaks no bound.
+pub(crate) fn average(graph: &DualGraph, labelled: &[bool], labels: &mut [f64]) {
+    if !labelled.contains(&true) {
+        labels.fill(0.0);
+        return;
+    }
+    let (low, high) = bounds(graph, labelled, labels);
+    let open: Vec<usize> = (0..graph.len()).filter(|&t| !labelled[t]).collect();
+    for &t in &open {
+        // Pieces without any label have no bounds.
+        labels[t] = if low[t].is_finite() {
+            0.5 * (low[t] + high[t])
+        } else {
+            0.0
+        };
+    }
+    for _ in 0..ROUNDS {
+        for &t in &open {
+            let (mut low, mut high, mut sum, mut count) = (f64::NEG_INFINITY, f64::INFINITY, 0.0, 0_u32);
+            for (near, length) in graph.neighbours(t) {
+                low = low.max(labels[near] - length);
+                high = high.min(labels[near] + length);
+                sum += labels[near];
+                count += 1;
+            }
+            if count > 0 {
+                // Rounding may leave nothing between the bounds; then the value stays.
+                let mean = sum / f64::from(count);
+                if low <= high {
+                    labels[t] = mean.clamp(low, high);
+                }
+            }
+        }
+    }
+}

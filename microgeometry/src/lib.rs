@@ -1,0 +1,92 @@
+//! Relief on any mesh with the structure of a picture: stochastic microgeometry (Schroeder et al. 2005).
+//!
+//! A picture of two regions (pores and grains, light and dark) is summed up by how far its points lie from the interface between them: its *contact distribution*. Such a distribution is rebuilt on a mesh by giving every triangle a signed distance x so that
+//!
+//! ```text
+//! shares of the surface with x in [k b, (k+1) b)  =  shares of the picture          (the histogram, section 4.3)
+//! |xₐ − x_b| ≤ d(a, b)   for all triangles        (no distance changes faster than the way over the surface, section 4.4)
+//! offset of a vertex = s k f(|x|) along its normal (section 4.5)
+//! ```
+//!
+//! with d the length of paths over the dual of the mesh. Labels are given from the largest distances inwards. Whoever lies so near a label that it must have one of this bin gets it; then random triangles that may. The random choice is what makes every seed another instance of one material.
+//!
+//! # Examples
+//!
+//! From a picture to a relief:
+//!
+//! ```
+//! use ndarray::Array2;
+//! use stereology_microgeometry::{EstimateOptions, Offset, ReconstructOptions, contact_of_picture, displace, reconstruct, to_distribution_units};
+//! use stereology_shape::TriangleMesh;
+//!
+//! let dots = Array2::from_shape_fn((120, 120), |(y, x)| {
+//!     let (u, v) = ((y % 24) as f64 - 11.5, (x % 24) as f64 - 11.5);
+//!     u.hypot(v) < 8.0
+//! });
+//! let contact = contact_of_picture(dots.view(), &EstimateOptions::default())?;
+//! let ball = TriangleMesh::icosphere(2.0, 4);
+//! let labels = reconstruct(&to_distribution_units(&ball, 30.0)?, &contact, &ReconstructOptions::default(), &|_| std::ops::ControlFlow::Continue(()))?;
+//! assert_eq!(labels.violations, 0);
+//! let relief = displace(&ball, &labels.labels, &Offset::still(), &"out,0.02,sqrt".parse()?)?;
+//! assert_eq!(relief.mesh.triangles.len(), 5120);
+//! # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
+//! ```
+//!
+//! A spherical cap's geodesic distances to its rim are known: nearer to the pole than θ lies the share (1 − cos θ)/2 of a sphere.
+//!
+//! ```
+//! use stereology_microgeometry::{Adjacency, DualGraph, Metric, interface_distances};
+//! use stereology_shape::TriangleMesh;
+//!
+//! let ball = TriangleMesh::icosphere(2.0, 5);
+//! let height = |t: &[u32; 3]| t.iter().map(|&v| ball.vertices[v as usize].z).sum::<f64>() / 3.0;
+//! let hemispheres: Vec<f64> = ball.triangles.iter().map(height).collect();
+//! let graph = DualGraph::new(&ball, Adjacency::Vertices, Metric::Isotropic)?;
+//! let far = interface_distances(&graph, &hemispheres).into_iter().filter(|d| *d > std::f64::consts::FRAC_PI_4).count();
+//! let expected = (1.0 - std::f64::consts::FRAC_PI_4.cos()) / 2.0; // the cap of 45° about the pole
+//! assert!((far as f64 / 20480.0 - expected).abs() < 0.01);
+//! # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
+//! ```
+//!
+//! # What was rejected
+//!
+//! Labels one triangle after the other with their bounds spread each time (20 times slower on fine meshes than many seeds at once). The dual over edges as the default (its paths are 1.2 to 1.3 times too long). Seeds without looking ahead, as in the paper: 7 to 30 % of the triangles are left over, against none.
+//! The meshopt crate for simplification (it compiles C++).
+
+mod bounds;
+mod budget;
+mod contact;
+mod design;
+mod displacement;
+mod distance_transform;
+mod dual;
+mod edges;
+mod error;
+mod estimate;
+mod exploration;
+mod families;
+mod leftovers;
+mod measure;
+mod paper;
+mod reconstruction;
+mod refinement;
+mod simplification;
+mod structuring_set;
+mod tight;
+pub use contact::{ContactDistribution, MOST_BINS};
+pub use design::{Design, Preset, presets};
+pub use displacement::{Direction, Displaced, Offset, Profile, displace, vertex_normals, vertex_values};
+pub use distance_transform::distance_to_other_region;
+pub use dual::{Adjacency, DualGraph, Metric};
+pub use edges::EdgeCensus;
+pub use error::MicrogeometryError;
+pub use estimate::{Counting, EstimateOptions, contact_of_picture, contact_of_volume, otsu};
+pub use exploration::Exploration;
+pub use families::Law;
+pub use measure::{distribution_of, interface_distances, violations};
+pub use reconstruction::{
+    Method, ReconstructOptions, Reconstruction, Shortfall, Weighting, reconstruct, to_distribution_units,
+};
+pub use refinement::{MOST_TRIANGLES, refined};
+pub use simplification::{Simplified, simplified};
+pub use structuring_set::StructuringSet;

@@ -1,0 +1,187 @@
+//! Meshes made fine enough to carry the relief (section 4.4: split triangles until the mesh is fine enough).
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "more vertices than 32 bits number are refused before"
+)]
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, Vector3};
+use stereology_shape::{Subdivision, TriangleMesh};
+
+use crate::error::MicrogeometryError;
+
+/// More triangles than this are refused.
+pub const MOST_TRIANGLES: usize = 50_000_000;
+
+/// The mesh with no edge longer than `edge_length`.
+///
+/// [`Subdivision::Midpoint`] splits the edges that are too long at their middles, and only those: the surface stays as it was, and uneven meshes become even. [`Subdivision::Loop`] first rounds the whole mesh by Loop's scheme (borders by their own rule) until edges are so long on average, then splits those still too long. Open meshes and edges with any number of triangles are allowed.
+/// Cost: linear in the triangles that result.
+///
+/// # Errors
+///
+/// [`MicrogeometryError::Parameter`] if the length is no positive number or would make more than [`MOST_TRIANGLES`].
+///
+/// # Examples
+///
+/// ```
+/// use stereology_microgeometry::refined;
+/// use stereology_shape::{Subdivision, TriangleMesh};
+///
+/// let bar = TriangleMesh::cuboid([8.0, 1.0, 1.0]);
+/// let fine = refined(&bar, Subdivision::Midpoint, 0.5)?;
+/// for t in &fine.triangles {
+///     for k in 0..3 {
+///         let [a, b] = [t[k], t[(k + 1) % 3]].map(|v| fine.vertices[v as usize]);
+///         assert!((a - b).norm() <= 0.5);
+///     }
+/// }
+/// # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
+/// ```
+pub fn refined(mesh: &TriangleMesh, scheme: Subdivision, edge_length: f64) -> Result<TriangleMesh, MicrogeometryError> {
+    if !(edge_length.is_finite() && edge_length > 0.0) {
+        return Err(MicrogeometryError::Parameter(format!(
+            "the length of edges is a positive finite number, not {edge_length}"
+        )));
+    }
+    let mut mesh = mesh.clone();
+    if scheme == Subdivision::Loop {
+        while mean_edge(&mesh) > edge_length {
+            check_count(4 * mesh.triangles.len(), edge_length)?;
+            mesh = split(&mesh, &edges(&mesh), |_| true, true);
+        }
+    }
+    loop {
+        let all = edges(&mesh);
+        let long: Vec<bool> = all
+            .iter()
+            .map(|edge| (mesh.vertices[edge.from as usize] - mesh.vertices[edge.to as usize]).norm() > edge_length)
+            .collect();
+        let count = long.iter().filter(|long| **long).count();
+        if count == 0 {
+            return Ok(mesh);
+        }
+        check_count(mesh.triangles.len() + 2 * count, edge_length)?;
+        mesh = split(&mesh, &all, |edge| long[edge], false);
+    }
+}
+
+fn check_count(triangles: usize, edge_length: f64) -> Result<(), MicrogeometryError> {
+    if triangles > MOST_TRIANGLES {
+        return Err(MicrogeometryError::Parameter(format!(
+            "edges of {edge_length} would make more than {MOST_TRIANGLES} triangles: ask for longer edges"
+        )));
+    }
+    Ok(())
+}
+
+fn mean_edge(mesh: &TriangleMesh) -> f64 {
+    let lengths = mesh.triangles.iter().flat_map(|t| {
+        [0, 1, 2].map(|k| (mesh.vertices[t[k] as usize] - mesh.vertices[t[(k + 1) % 3] as usize]).norm())
+    });
+    lengths.sum::<f64>() / (3 * mesh.triangles.len()).max(1) as f64
+}
+
+/// An edge, and the corners opposite to it in its triangles.
+struct Edge {
+    from: u32,
+    to: u32,
+    opposite: Vec<u32>,
+}
+
+fn edges(mesh: &TriangleMesh) -> Vec<Edge> {
+    let mut sides: Vec<(u32, u32, u32)> = mesh
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b, c), (b, c, a), (c, a, b)])
+        .map(|(from, to, opposite)| (from.min(to), from.max(to), opposite))
+        .collect();
+    sides.sort_unstable();
+    sides
+        .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
+        .map(|same| Edge {
+            from: same[0].0,
+            to: same[0].1,
+            opposite: same.iter().map(|side| side.2).collect(),
+        })
+        .collect()
+}
+
+/// Splits the edges that `chosen` chooses; with `smooth` vertices move by Loop's rules (1987; borders by Hoppe 1994).
+fn split(mesh: &TriangleMesh, edges: &[Edge], chosen: impl Fn(usize) -> bool, smooth: bool) -> TriangleMesh {
+    let at = |v: u32| mesh.vertices[v as usize].coords;
+    let mut vertices = if smooth {
+        smoothed(mesh, edges)
+    } else {
+        mesh.vertices.clone()
+    };
+    let mut middles = vec![u32::MAX; edges.len()];
+    for (number, edge) in edges.iter().enumerate().filter(|(number, _)| chosen(*number)) {
+        let middle = match edge.opposite[..] {
+            [c, d] if smooth => 0.375 * (at(edge.from) + at(edge.to)) + 0.125 * (at(c) + at(d)),
+            _ => 0.5 * (at(edge.from) + at(edge.to)),
+        };
+        middles[number] = vertices.len() as u32;
+        vertices.push(Point3::from(middle));
+    }
+    let middle = |a: u32, b: u32| {
+        let place = edges.partition_point(|edge| (edge.from, edge.to) < (a.min(b), a.max(b)));
+        Some(middles[place]).filter(|&m| m != u32::MAX)
+    };
+    let mut triangles = Vec::with_capacity(mesh.triangles.len() + 2 * edges.len());
+    for &[a, b, c] in &mesh.triangles {
+        match [middle(a, b), middle(b, c), middle(c, a)] {
+            [Some(ab), Some(bc), Some(ca)] => {
+                triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+            }
+            [None, None, None] => triangles.push([a, b, c]),
+            [Some(m), None, None] => triangles.extend([[a, m, c], [m, b, c]]),
+            [None, Some(m), None] => triangles.extend([[b, m, a], [m, c, a]]),
+            [None, None, Some(m)] => triangles.extend([[c, m, b], [m, a, b]]),
+            [Some(ab), Some(bc), None] => two_split(&vertices, &mut triangles, [a, ab, b, bc, c]),
+            [None, Some(bc), Some(ca)] => two_split(&vertices, &mut triangles, [b, bc, c, ca, a]),
+            [Some(ab), None, Some(ca)] => two_split(&vertices, &mut triangles, [c, ca, a, ab, b]),
+        }
+    }
+    TriangleMesh { vertices, triangles }
+}
+
+/// A triangle a b c with middles on a b and b c: the corner at b, and the shorter diagonal of the rest.
+fn two_split(vertices: &[Point3<f64>], triangles: &mut Vec<[u32; 3]>, [a, ab, b, bc, c]: [u32; 5]) {
+    let length = |i: u32, j: u32| (vertices[i as usize] - vertices[j as usize]).norm_squared();
+    triangles.push([ab, b, bc]);
+    if length(a, bc) <= length(ab, c) {
+        triangles.extend([[a, ab, bc], [a, bc, c]]);
+    } else {
+        triangles.extend([[a, ab, c], [ab, bc, c]]);
+    }
+}
+
+/// Vertices drawn towards their neighbours by Loop's weight, on borders along the border alone.
+fn smoothed(mesh: &TriangleMesh, edges: &[Edge]) -> Vec<Point3<f64>> {
+    let zero = (Vector3::zeros(), 0_u32);
+    let (mut inner, mut border) = (vec![zero; mesh.vertices.len()], vec![zero; mesh.vertices.len()]);
+    for edge in edges {
+        let sums = if edge.opposite.len() == 2 {
+            &mut inner
+        } else {
+            &mut border
+        };
+        for (to, from) in [(edge.from, edge.to), (edge.to, edge.from)] {
+            sums[to as usize].0 += mesh.vertices[from as usize].coords;
+            sums[to as usize].1 += 1;
+        }
+    }
+    let place = |(v, p): (usize, &Point3<f64>)| match (inner[v], border[v]) {
+        (_, (sum, 2)) => Point3::from(0.75 * p.coords + 0.125 * sum),
+        ((sum, count @ 1..), (_, 0)) => {
+            let n = f64::from(count.max(3));
+            let weight = 0.625 - (0.375 + 0.25 * (TAU / n).cos()).powi(2);
+            Point3::from(p.coords * (1.0 - weight) + sum * (weight / f64::from(count)))
+        }
+        // Where several borders meet, and what no triangle uses.
+        _ => *p,
+    };
+    mesh.vertices.iter().enumerate().map(place).collect()
+}

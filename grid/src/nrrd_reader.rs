@@ -3,7 +3,7 @@
 use crate::GridError;
 use crate::sample_type::SampleType;
 use flate2::read::MultiGzDecoder;
-use ndarray::{ArrayD, IxDyn};
+use ndarray::{ArrayD, Axis, IxDyn};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -94,7 +94,13 @@ fn channel_last(samples: ArrayD<f32>, kinds: Option<&String>, sizes: &[usize]) -
             .find(|&axis| sizes.len() == 4 && sizes[axis] <= 4)
     };
     let Some(axis) = named.or_else(small) else {
-        return samples;
+        // A volume whose kinds say so, however few voxels it has along x.
+        let is_volume = kinds.is_some() && sizes.len() == 3;
+        return if is_volume {
+            samples.insert_axis(Axis(3))
+        } else {
+            samples
+        };
     };
     // Axes of the file are fastest first, ours slowest first.
     let Some(axis) = sizes.len().checked_sub(1 + axis) else {

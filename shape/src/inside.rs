@@ -13,8 +13,8 @@ use crate::winding::ray_crossing;
 /// use stereology_shape::{ClosedMesh, InsideTest, TriangleMesh};
 ///
 /// let ball = InsideTest::new(&ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3))?);
-/// assert!(ball.contains(&Point3::new(0.0, 0.0, 0.9)));
-/// assert!(!ball.contains(&Point3::new(0.0, 0.8, 0.8)));
+/// assert!(ball.contains(&Point3::new(0.0, 0.0, 0.45)));
+/// assert!(!ball.contains(&Point3::new(0.0, 0.4, 0.4)));
 /// # Ok::<(), stereology_shape::MeshError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -182,7 +182,7 @@ impl UnitBody {
     ///
     /// let ball = UnitBody::new(&Body::sphere(1.0)?);
     /// let chord = ball.chord(&Point3::new(-2.0, 0.3, 0.0), &Vector3::x()).expect("balls have chords");
-    /// assert!((chord.sure[0] - 1.6).abs() < 1e-9 && (chord.sure[1] - 2.4).abs() < 1e-9);
+    /// assert!((chord.sure[0] - 1.6).abs() < 1e-8 && (chord.sure[1] - 2.4).abs() < 1e-8);
     /// # Ok::<(), stereology_shape::BodyError>(())
     /// ```
     #[must_use]

@@ -150,7 +150,7 @@ mod tests {
             super::bowl(1.0),
             super::slab(1.0, 0.1),
             super::column(0.2, 1.0),
-            super::knot(1.0, 0.7),
+            super::knot(1.0, 0.6),
         ] {
             let closed = ClosedMesh::try_from(mesh).expect("a closed mesh");
             assert!(closed.repairs().is_empty(), "{:?}", closed.repairs());

@@ -6,6 +6,8 @@ use rayon::prelude::*;
 const TABLE: usize = 4096;
 /// Values handed to a thread at a time.
 const BLOCK: usize = 1 << 16;
+/// Tables that are counted apart.
+const PARTS: usize = 16;
 
 /// Values cannot be matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -313,20 +315,26 @@ impl Table {
                 bins: vec![[reference.at(0.5), 0.0]],
             };
         }
-        // Counts are whole numbers: they add up to the same in any order.
-        let counts = pieces
-            .par_iter()
-            .flat_map_iter(|&(piece, factor)| piece.chunks(BLOCK).map(move |values| (values, factor)))
-            .fold(
-                || vec![0_u64; TABLE],
-                |mut counts, (values, factor)| {
+        let blocks: Vec<(&[f32], f32)> = pieces
+            .iter()
+            .flat_map(|&(piece, factor)| piece.chunks(BLOCK).map(move |values| (values, factor)))
+            .collect();
+        let counts: Vec<Vec<u64>> = blocks
+            .par_chunks(blocks.len().div_ceil(PARTS).max(1))
+            .map(|blocks| {
+                let mut counts = vec![0; TABLE];
+                for &(values, factor) in blocks {
                     for &v in values {
                         counts[bin(factor * v, lowest, scale).0] += 1;
                     }
-                    counts
-                },
-            )
-            .reduce(|| vec![0; TABLE], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
+                }
+                counts
+            })
+            .collect();
+        let counts = counts.into_iter().fold(vec![0_u64; TABLE], |mut sum, part| {
+            sum.iter_mut().zip(&part).for_each(|(sum, n)| *sum += n);
+            sum
+        });
         let n = counts.iter().sum::<u64>() as f64;
         let mut below = 0_u64;
         let mut edge = reference.at(0.0);

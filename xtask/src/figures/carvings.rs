@@ -101,7 +101,7 @@ pub fn column(radius: f64, height: f64) -> TriangleMesh {
     turned_with(&outline, |angle| 1.0 - 0.045 * (10.0 * angle).sin().abs())
 }
 
-/// A trefoil knot of a tube, its axis along z; it reaches 3 `scale` + `tube` from the axis.
+/// A trefoil knot of a tube, its axis along z; it reaches 3 `scale` + `tube` from the axis. Tubes wider than 0.6 `scale` run into one another.
 pub fn knot(scale: f64, tube: f64) -> TriangleMesh {
     const ALONG: u32 = 480;
     const ACROSS: u32 = 64;

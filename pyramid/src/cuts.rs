@@ -264,9 +264,10 @@ impl Cuts {
                     }
                     for (sums, positions) in sums.iter_mut().zip(&positions) {
                         for (&position, &power) in positions.iter().zip(&power) {
-                            let sum = &mut sums[position as usize];
+                            let below = position as usize;
+                            let sum = &mut sums[below];
                             sum[0] += power;
-                            sum[1] += f64::from(position - position.floor()) * power;
+                            sum[1] += f64::from(position - below as f32) * power;
                         }
                     }
                     if let Some(change) = changed {

@@ -1,5 +1,6 @@
 //! Fourier transforms of fields with one to three axes, each axis of any length.
 
+use std::array;
 use std::sync::Arc;
 
 use ndarray::{Array, ArrayBase, ArrayView, ArrayViewMut2, ArrayViewMut3, Axis, Data, Dimension};
@@ -468,16 +469,22 @@ fn transform_lanes<T: Real>(
     let (n, columns) = matrix.dim();
     let lanes = &mut lanes[..n * columns];
     for (block, rows) in matrix.axis_chunks_iter(Axis(0), ROWS).enumerate() {
-        for (lane, column) in lanes.chunks_exact_mut(n).zip(rows.columns()) {
+        let mut rows = rows.axis_iter(Axis(0));
+        let rows: [&[Complex<T>]; ROWS] =
+            array::from_fn(|_| rows.next().and_then(|row| row.to_slice()).unwrap_or_default());
+        for (c, lane) in lanes.chunks_exact_mut(n).enumerate() {
             let lane = &mut lane[block * ROWS..];
-            lane.iter_mut().zip(column).for_each(|(to, from)| *to = *from);
+            lane.iter_mut().zip(&rows).for_each(|(to, row)| *to = row[c]);
         }
     }
     plan.process_with_scratch(lanes, scratch);
     for (block, mut rows) in matrix.axis_chunks_iter_mut(Axis(0), ROWS).enumerate() {
-        for (lane, column) in lanes.chunks_exact(n).zip(rows.columns_mut()) {
+        let mut rows = rows.outer_iter_mut();
+        let mut rows: [&mut [Complex<T>]; ROWS] =
+            array::from_fn(|_| rows.next().and_then(|row| row.into_slice()).unwrap_or_default());
+        for (c, lane) in lanes.chunks_exact(n).enumerate() {
             let lane = &lane[block * ROWS..];
-            column.into_iter().zip(lane).for_each(|(to, from)| *to = *from);
+            rows.iter_mut().zip(lane).for_each(|(row, from)| row[c] = *from);
         }
     }
 }

@@ -16,6 +16,7 @@ use stereology_spectrum::{Complex, RealFft, frequency};
 use crate::PyramidError;
 use crate::bank::most_levels;
 use crate::filters::{Directions, band_response};
+use crate::matching::whole_and_part;
 use crate::reweight::Change;
 
 /// Steps of the tables of responses, up to the corner of the cube.
@@ -228,11 +229,6 @@ impl Cuts {
 
     /// Power of the transform by the radius of the tangential frequency, for every normal; and, if waves are `changed`, what
     /// is asked about them afterwards.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "radii are at most √3 < 2"
-    )]
     pub(crate) fn power_by_radius(
         &mut self,
         normals: &[Unit<Vector3<f64>>],
@@ -264,10 +260,10 @@ impl Cuts {
                     }
                     for (sums, positions) in sums.iter_mut().zip(&positions) {
                         for (&position, &power) in positions.iter().zip(&power) {
-                            let below = position as usize;
-                            let sum = &mut sums[below];
+                            let (below, share) = whole_and_part(position);
+                            let sum = &mut sums[below as usize];
                             sum[0] += power;
-                            sum[1] += f64::from(position - below as f32) * power;
+                            sum[1] += f64::from(share) * power;
                         }
                     }
                     if let Some(change) = changed {

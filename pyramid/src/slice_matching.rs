@@ -52,7 +52,7 @@ impl Rounds<'_> {
         match (to_come, round) {
             (0, _) => &[Planes::FaceDiagonals, Planes::Axes],
             (_, 0) => &[Planes::Axes],
-            (1, _) => &[Planes::SpaceDiagonals],
+            (1, _) => &[Planes::FaceDiagonals, Planes::SpaceDiagonals],
             (_, round) if round.is_multiple_of(2) => &[Planes::Axes],
             _ => &[Planes::FaceDiagonals],
         }

@@ -481,7 +481,7 @@ fn transform_lanes<T: Real>(
     for (block, mut rows) in matrix.axis_chunks_iter_mut(Axis(0), ROWS).enumerate() {
         let mut rows = rows.outer_iter_mut();
         let mut rows: [&mut [Complex<T>]; ROWS] =
-            array::from_fn(|_| rows.next().and_then(|row| row.into_slice()).unwrap_or_default());
+            array::from_fn(|_| rows.next().and_then(ArrayBase::into_slice).unwrap_or_default());
         for (c, lane) in lanes.chunks_exact(n).enumerate() {
             let lane = &lane[block * ROWS..];
             rows.iter_mut().zip(lane).for_each(|(row, from)| row[c] = *from);

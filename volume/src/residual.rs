@@ -47,6 +47,9 @@ pub enum Lookup {
 
 const MOST_GAIN: f32 = 8.0;
 
+/// Three channels and a fourth of no account, so that they are worked out at once.
+type Lanes = [f32; 4];
+
 /// A repeating colour volume prepared for lookups.
 #[derive(Clone, Debug)]
 pub(crate) struct Field {
@@ -147,17 +150,21 @@ impl Field {
                 lookup,
                 starts: [start(y, z); 4],
                 weights: [1.0, 0.0, 0.0, 0.0],
-                variance: [[0.0; 3]; 2],
+                variance: [[0.0; 4]; 2],
+                whole: [1.0; 4],
                 blended: Vec::new(),
             };
         }
         let [y, z] = [0, 1].map(|k| self.between(k + 1, yz[k]));
-        let mut variance = [[0.0; 3]; 2];
-        if lookup == Lookup::VarianceKept {
-            let [ay, az] = [y, z].map(|of| 2.0 * of.share * (1.0 - of.share));
-            let weights = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
-            for (lag, covariance) in self.covariance.iter().enumerate() {
-                (0..3).for_each(|c| variance[lag & 1][c] += weights[lag >> 1] * covariance[c]);
+        let [ay, az] = [y, z].map(|of| 2.0 * of.share * (1.0 - of.share));
+        let weights = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
+        let (mut variance, mut whole) = ([[0.0; 4]; 2], [1.0; 4]);
+        for c in 0..3 {
+            if self.covariance[0][c] > 0.0 {
+                whole[c] = self.covariance[0][c];
+                for (lag, covariance) in self.covariance.iter().enumerate() {
+                    variance[lag & 1][c] += weights[lag >> 1] * covariance[c];
+                }
             }
         }
         FieldRow {
@@ -176,6 +183,7 @@ impl Field {
                 y.share * z.share,
             ],
             variance,
+            whole,
             blended: Vec::new(),
         }
     }
@@ -211,9 +219,11 @@ pub(crate) struct FieldRow<'a> {
     starts: [usize; 4],
     weights: [f32; 4],
     /// What trilinear weights leave of the variance: at the voxels' x, and what is in it of their neighbours'.
-    variance: [[f32; 3]; 2],
+    variance: [Lanes; 2],
+    /// Variance of the voxels; 1 where they do not vary.
+    whole: Lanes,
     /// The four rows blended, if they are to be read more than once.
-    blended: Vec<[f32; 3]>,
+    blended: Vec<Lanes>,
 }
 
 impl FieldRow<'_> {
@@ -249,30 +259,31 @@ impl FieldRow<'_> {
     }
 
     /// The four rows at the x of a voxel.
-    fn blend(&self, voxel: usize) -> [f32; 3] {
-        let [a, b, c, d] = self.starts.map(|start| self.field.samples[start + voxel]);
+    fn blend(&self, voxel: usize) -> Lanes {
+        let [a, b, c, d] = self.starts.map(|start| lanes(self.field.samples[start + voxel]));
         let w = self.weights;
-        [0, 1, 2].map(|k| (w[0] * a[k] + w[1] * b[k]) + (w[2] * c[k] + w[3] * d[k]))
+        [0, 1, 2, 3].map(|k| (w[0] * a[k] + w[1] * b[k]) + (w[2] * c[k] + w[3] * d[k]))
     }
 
-    fn between(&self, low: [f32; 3], high: [f32; 3], f: f32) -> [f32; 3] {
-        let value = [0, 1, 2].map(|c| (1.0 - f) * low[c] + f * high[c]);
-        if self.lookup != Lookup::VarianceKept {
-            return value;
+    fn between(&self, low: Lanes, high: Lanes, f: f32) -> [f32; 3] {
+        let mut value = [0, 1, 2, 3].map(|c| (1.0 - f) * low[c] + f * high[c]);
+        if self.lookup == Lookup::VarianceKept {
+            let apart = 2.0 * f * (1.0 - f);
+            let mean = lanes(self.field.mean);
+            let left = [0, 1, 2, 3].map(|c| (1.0 - apart) * self.variance[0][c] + apart * self.variance[1][c]);
+            let gain = [0, 1, 2, 3].map(|c| {
+                let least = self.whole[c] / MOST_GAIN;
+                let left = if left[c] > least { left[c] } else { least };
+                (self.whole[c] / left).sqrt()
+            });
+            value = [0, 1, 2, 3].map(|c| mean[c] + (value[c] - mean[c]) * gain[c]);
         }
-        let Field { mean, covariance, .. } = self.field;
-        let apart = 2.0 * f * (1.0 - f);
-        [0, 1, 2].map(|c| {
-            let whole = covariance[0][c];
-            let left = (1.0 - apart) * self.variance[0][c] + apart * self.variance[1][c];
-            let gain = if whole > 0.0 {
-                (whole / left.max(whole / MOST_GAIN)).sqrt()
-            } else {
-                1.0
-            };
-            mean[c] + (value[c] - mean[c]) * gain
-        })
+        [value[0], value[1], value[2]]
     }
+}
+
+fn lanes([r, g, b]: [f32; 3]) -> Lanes {
+    [r, g, b, 0.0]
 }
 
 fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -162,7 +162,7 @@ fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensi
 fn carved(colour: &(dyn Fn(&Point3<f64>) -> [f32; 3] + Sync)) -> Result<RgbImage> {
     let sliced = SLICES[SLICES.len() - 1];
     let middle = Vector3::new(0.5 * SIDE, 0.5 * SIDE, 0.5 * (sliced + SIDE));
-    let mesh = knot(60.0, 50.0).mapped(|p| p + middle);
+    let mesh = knot(64.0, 38.0).mapped(|p| p + middle);
     let camera = Camera {
         up: Vector3::y_axis(),
         azimuth: 24.0,

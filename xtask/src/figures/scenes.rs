@@ -87,7 +87,7 @@ pub fn draw_sculpture(folder: &Path) -> Result<()> {
     let (terrazzo, asphalt, foam) = (terrazzo()?.solid, asphalt()?.solid, foam()?.solid);
     let [step, height] = [70.0, 560.0];
     let floor = 2.0 * step + 4.0 * NEAR;
-    let standing = knot(64.0, 52.0).mapped(|p| Point3::new(p.x, -p.z, p.y));
+    let standing = knot(68.0, 40.0).mapped(|p| Point3::new(p.x, -p.z, p.y));
     let foot = floor + height + 2.0 * NEAR + 3.0 * 64.0 + 52.0;
     let things = [
         Thing::new(

@@ -3,7 +3,7 @@
 use crate::Solid;
 use crate::carve::{CarveError, check};
 use crate::charts::{Chart, Layout, MARGIN, Rectangle, charts, least_side};
-use crate::solid::{add, to_bytes};
+use crate::colour::{add, to_bytes};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;

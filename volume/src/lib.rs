@@ -61,6 +61,7 @@ mod atlas;
 mod carve;
 mod cells;
 mod charts;
+mod colour;
 mod residual;
 mod row;
 mod sections;

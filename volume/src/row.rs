@@ -2,7 +2,7 @@
 
 use crate::Solid;
 use crate::cells::NONE;
-use crate::solid::add;
+use crate::colour::add;
 
 /// The points ((i + ½) step + shift, y, z) of the box, i = 0, 1, ...
 #[derive(Clone, Copy, Debug)]

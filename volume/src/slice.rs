@@ -5,7 +5,8 @@
     reason = "ids are checked against 2^31 by Solid::new; sample counts are clamped"
 )]
 
-use crate::solid::{Solid, add, to_bytes};
+use crate::colour::{add, to_bytes};
+use crate::solid::Solid;
 use crate::{Axis, SolidError};
 use image::RgbImage;
 use nalgebra::{Point3, Unit, UnitVector3, Vector3};

@@ -1,6 +1,7 @@
 //! The solid: what is at a point of a material that repeats.
 
 use crate::cells::Cells;
+use crate::colour::add;
 use crate::residual::{Field, FieldRow, Lookup, Residual};
 use crate::row::Row;
 use crate::voids::Voids;
@@ -366,21 +367,6 @@ impl Solid {
     pub(crate) fn border_samples(&self) -> u32 {
         self.border_samples
     }
-}
-
-pub(crate) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-/// The only place where colours are clamped: encoded values to bytes.
-#[allow(clippy::cast_possible_truncation, reason = "clamped to the range of u8")]
-pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
-    colour.map(|value| {
-        let value = value * 255.0;
-        // A cast rounds down and clamps; what it took away decides, as in `round`, which is a slow call.
-        let floor = value as u8;
-        floor.saturating_add(u8::from(value - f32::from(floor) >= 0.5))
-    })
 }
 
 fn check_particles(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<(), SolidError> {

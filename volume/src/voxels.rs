@@ -6,8 +6,8 @@
 )]
 
 use crate::Solid;
+use crate::colour::to_bytes;
 use crate::row::{Row, index};
-use crate::solid::to_bytes;
 use nalgebra::{Point3, Vector3};
 use ndarray::{ArrayViewMut2, ArrayViewMut3};
 use rayon::prelude::*;

@@ -11,7 +11,7 @@ use stereology_microgeometry::{
 use stereology_shape::TriangleMesh;
 
 fn reconstruct_spheres(c: &mut Criterion) {
-    let of = ContactDistribution::from_laws(1.0, Law::Rayleigh(3.5), Law::Rayleigh(3.5), 0.5).expect("a distribution");
+    let of = ContactDistribution::from_laws(1.0, Law::Disc(12.0), Law::Disc(12.0), 0.5).expect("a distribution");
     let mut group = c.benchmark_group("reconstruct");
     group
         .sample_size(10)

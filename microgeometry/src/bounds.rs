@@ -4,10 +4,9 @@
     reason = "triangles and levels are numbered in 32 bits"
 )]
 
-use std::collections::BinaryHeap;
-
 use crate::budget::Levels;
-use crate::dual::{DualGraph, rank};
+use crate::dual::DualGraph;
+use crate::wavefront::Wavefront;
 
 /// One region while its labels are given, seen as if it were the positive one: the negative region's labels and bounds have their signs changed.
 ///
@@ -26,7 +25,7 @@ pub(crate) struct Region<'a> {
     came: Vec<Vec<u32>>,
     /// What a level may be overfilled by.
     tolerance: i64,
-    queue: BinaryHeap<(u64, u32)>,
+    front: Wavefront,
     undo: Vec<Change>,
     /// Steps looked at since this was last set to zero.
     pub(crate) work: u64,
@@ -47,6 +46,11 @@ pub(crate) struct Limit<'a> {
     pub(crate) spare: i64,
 }
 
+/// Buckets as narrow as half an edge, a whole number of them a level.
+fn bucket(graph: &DualGraph, height: f64) -> f64 {
+    height / (2.0 * height / graph.mean_length()).ceil().clamp(1.0, 512.0)
+}
+
 /// A region whose seeds would force more triangles into a level than it has room for.
 pub(crate) struct Overfull;
 
@@ -61,7 +65,7 @@ impl<'a> Region<'a> {
             forced: vec![0; levels],
             came: vec![Vec::new(); levels],
             tolerance,
-            queue: BinaryHeap::new(),
+            front: Wavefront::new(bucket(graph, height)),
             undo: Vec::new(),
             work: 0,
         }
@@ -100,19 +104,18 @@ impl<'a> Region<'a> {
         labelled: &mut [bool],
         limit: &Limit<'_>,
     ) -> Result<(), Overfull> {
-        self.queue.clear();
+        self.front.restart(value);
         self.undo.clear();
         for &t in seeds {
             self.raise(t, value);
             self.settle(t);
             labelled[t as usize] = true;
         }
-        while let Some((key, t)) = self.queue.pop() {
-            let value = self.bound[t as usize];
-            if rank(value) != key {
+        while let Some((value, t)) = self.front.pop() {
+            if value < self.bound[t as usize] {
                 continue;
             }
-            // Values come in falling order: who leaves a level for a higher one has left before others come.
+            // Values come level by level: who leaves a level for a higher one has left before others come.
             if value >= 0.0 && !labelled[t as usize] {
                 let level = (value / self.height) as usize;
                 let counted = self.counted[t as usize] as usize;
@@ -132,7 +135,7 @@ impl<'a> Region<'a> {
             let links = self.graph.links(t as usize);
             self.work += links.len() as u64;
             for link in links {
-                let there = value - link.length;
+                let there = value - link.length();
                 if there > self.bound[link.to as usize] && there > floor {
                     self.raise(link.to, there);
                 }
@@ -170,7 +173,7 @@ impl<'a> Region<'a> {
                 bound: self.bound[t as usize],
             });
             self.bound[t as usize] = value;
-            self.queue.push((rank(value), t));
+            self.front.push(value, t);
         }
     }
 

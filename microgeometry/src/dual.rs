@@ -4,13 +4,12 @@
     reason = "meshes number their triangles in 32 bits"
 )]
 
-use std::collections::BinaryHeap;
-
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::TriangleMesh;
 
 use crate::error::MicrogeometryError;
+use crate::wavefront::Wavefront;
 
 /// Which triangles are neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,20 +99,37 @@ impl Metric {
 #[derive(Clone, Debug)]
 pub struct DualGraph {
     /// Where the neighbours of each triangle begin.
-    starts: Vec<usize>,
+    starts: Vec<u32>,
     links: Vec<Link>,
     areas: Vec<f64>,
     pieces: Vec<Vec<u32>>,
+    mean_length: f64,
 }
 
-/// A step to a neighbour. Lengths are kept in full: keys that are computed again must be the same.
+/// A step to a neighbour. Its length is rounded down to single precision, so that graphs need half the memory and no label differs by more than the length in full; all that is summed from it is in double precision.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
-    pub(crate) length: f64,
+    length: f32,
     pub(crate) to: u32,
 }
 
-/// More steps than this do not fit into memory: 4 GB.
+impl Link {
+    pub(crate) fn length(self) -> f64 {
+        f64::from(self.length)
+    }
+}
+
+/// The nearest number of single precision that is not larger; lengths are finite and not negative.
+pub(crate) fn rounded_down(length: f64) -> f32 {
+    let near = length as f32;
+    if f64::from(near) > length {
+        near.next_down()
+    } else {
+        near
+    }
+}
+
+/// More steps than this do not fit into memory: 2 GB.
 const MOST_LINKS: usize = 1 << 28;
 /// Coordinates are below this, so that squares of areas are numbers.
 const LARGEST: f64 = 1e60;
@@ -156,16 +172,18 @@ impl DualGraph {
             });
         }
         let numbers: Vec<u32> = (0..count as u32).collect();
-        let blocks: Vec<(Vec<usize>, Vec<Link>)> = numbers
+        let blocks: Vec<(Vec<u32>, Vec<Link>)> = numbers
             .par_chunks(BLOCK)
             .map(|block| {
                 let (mut sizes, mut links, mut near) = (Vec::with_capacity(block.len()), Vec::new(), Vec::new());
                 for &t in block {
                     around.neighbours(&mesh.triangles[t as usize], t, adjacency, &mut near);
-                    sizes.push(near.len());
+                    sizes.push(near.len() as u32);
                     links.extend(near.iter().map(|&to| Link {
                         // The same bits from both ends: the lower triangle first.
-                        length: metric.length(&(centroids[t.max(to) as usize] - centroids[t.min(to) as usize])),
+                        length: rounded_down(
+                            metric.length(&(centroids[t.max(to) as usize] - centroids[t.min(to) as usize])),
+                        ),
                         to,
                     }));
                 }
@@ -174,21 +192,40 @@ impl DualGraph {
             .collect();
         let mut starts = Vec::with_capacity(count + 1);
         let mut links = Vec::with_capacity(blocks.iter().map(|(_, links)| links.len()).sum());
-        starts.push(0);
+        starts.push(0_u32);
         for (sizes, of_block) in blocks {
             for size in sizes {
                 starts.push(starts[starts.len() - 1] + size);
             }
             links.extend(of_block);
         }
+        Ok(Self::finished(starts, links, areas))
+    }
+
+    /// A graph of these areas and steps: from, to, length; both ways, in order.
+    pub(crate) fn between(areas: Vec<f64>, steps: &[(u32, u32, f32)]) -> Self {
+        let mut starts = vec![0_u32; areas.len() + 1];
+        for step in steps {
+            starts[step.0 as usize + 1] += 1;
+        }
+        for node in 1..starts.len() {
+            starts[node] += starts[node - 1];
+        }
+        let links = steps.iter().map(|&(_, to, length)| Link { length, to }).collect();
+        Self::finished(starts, links, areas)
+    }
+
+    fn finished(starts: Vec<u32>, links: Vec<Link>, areas: Vec<f64>) -> Self {
+        let mean_length = links.iter().map(|link| link.length()).sum::<f64>() / links.len().max(1) as f64;
         let mut graph = Self {
             starts,
             links,
             areas,
             pieces: Vec::new(),
+            mean_length,
         };
         graph.pieces = graph.connected();
-        Ok(graph)
+        graph
     }
 
     /// How many triangles there are.
@@ -205,7 +242,7 @@ impl DualGraph {
 
     /// The triangles beside triangle `t` and how far their centroids are.
     pub fn neighbours(&self, t: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.links(t).iter().map(|link| (link.to as usize, link.length))
+        self.links(t).iter().map(|link| (link.to as usize, link.length()))
     }
 
     /// Areas of the triangles.
@@ -223,7 +260,7 @@ impl DualGraph {
     /// Mean length of an edge.
     #[must_use]
     pub fn mean_length(&self) -> f64 {
-        self.links.iter().map(|link| link.length).sum::<f64>() / self.links.len().max(1) as f64
+        self.mean_length
     }
 
     /// Distances over the graph from some triangles, each with a distance it starts with; infinite where no path leads. Cost: Dijkstra's, n log n.
@@ -240,12 +277,16 @@ impl DualGraph {
     #[must_use]
     pub fn distances(&self, from: &[(usize, f64)]) -> Vec<f64> {
         let mut negated = vec![f64::NEG_INFINITY; self.len()];
-        spread(self, &mut negated, from.iter().map(|&(t, d)| (t as u32, -d)));
+        for &(t, d) in from {
+            negated[t] = negated[t].max(-d);
+        }
+        let sources: Vec<(u32, f64)> = from.iter().map(|&(t, _)| (t as u32, negated[t])).collect();
+        spread(self, &mut negated, &sources);
         negated.into_iter().map(|d| -d).collect()
     }
 
     pub(crate) fn links(&self, t: usize) -> &[Link] {
-        &self.links[self.starts[t]..self.starts[t + 1]]
+        &self.links[self.starts[t] as usize..self.starts[t + 1] as usize]
     }
 
     fn connected(&self) -> Vec<Vec<u32>> {
@@ -273,34 +314,25 @@ impl DualGraph {
     }
 }
 
-/// Raises `bound` to max over the sources of (value − distance), everywhere: exact, and each triangle is settled once.
-pub(crate) fn spread(graph: &DualGraph, bound: &mut [f64], sources: impl Iterator<Item = (u32, f64)>) {
-    let mut queue = BinaryHeap::new();
-    for (t, value) in sources {
-        if value > bound[t as usize] {
-            bound[t as usize] = value;
-            queue.push((rank(value), t));
-        }
+/// Raises `bound` to max over the sources of (value − distance), everywhere: exact. Sources have their values already.
+pub(crate) fn spread(graph: &DualGraph, bound: &mut [f64], sources: &[(u32, f64)]) {
+    let mut front = Wavefront::new(0.5 * graph.mean_length());
+    front.restart(sources.iter().fold(f64::NEG_INFINITY, |most, of| most.max(of.1)));
+    for &(t, value) in sources {
+        front.push(value, t);
     }
-    while let Some((key, t)) = queue.pop() {
-        let value = bound[t as usize];
-        if rank(value) != key {
+    while let Some((value, t)) = front.pop() {
+        if value < bound[t as usize] {
             continue;
         }
         for link in graph.links(t as usize) {
-            let there = value - link.length;
+            let there = value - link.length();
             if there > bound[link.to as usize] {
                 bound[link.to as usize] = there;
-                queue.push((rank(there), link.to));
+                front.push(there, link.to);
             }
         }
     }
-}
-
-/// Whole numbers in the order of the floats.
-pub(crate) fn rank(x: f64) -> u64 {
-    let bits = x.to_bits();
-    if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }
 
 /// The triangles about each vertex.

@@ -1,5 +1,7 @@
 //! Random points of the parameter space (section 5.1 of the paper): designs to look at.
 
+use std::f64::consts::PI;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -9,10 +11,13 @@ use crate::displacement::{Direction, Offset, Profile};
 use crate::error::MicrogeometryError;
 use crate::families::Law;
 
+/// Pairs of laws drawn until one has a share of the positive region in its range.
+const TRIES: usize = 64;
+
 /// Where designs are drawn from. What is `Some` is the same in all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exploration {
-    /// The contact distribution; `None`: drawn too, a blend of two laws in each region.
+    /// The contact distribution; `None`: drawn too, a blend of two laws in each region. They are such that surfaces can have them: a density of distances begins with the length of the interface, which is the same for both regions, and cannot rise away from it in both.
     pub contact: Option<ContactDistribution>,
     /// Scale units, drawn evenly in their logarithm; table 1 has 27 to 82.
     pub units: [f64; 2],
@@ -140,27 +145,44 @@ impl Exploration {
     }
 
     fn contact(&self, random: &mut ChaCha8Rng) -> Result<ContactDistribution, MicrogeometryError> {
-        let [low, high] = self.shares;
-        let share = low + (high - low) * random.random::<f64>();
-        let one = |random: &mut ChaCha8Rng| {
-            let laws = [self.law(random), self.law(random)];
-            ContactDistribution::from_laws(1.0, laws[0], laws[1], share)
-        };
-        let (first, second) = (one(random)?, one(random)?);
+        let (first, second) = (self.pair(random)?, self.pair(random)?);
         first.blended(&second, random.random())
     }
 
+    /// Laws of both regions that a surface can have: next to the interface lies as much of the one as of the other, which says what share each has.
+    fn pair(&self, random: &mut ChaCha8Rng) -> Result<ContactDistribution, MicrogeometryError> {
+        let [low, high] = self.shares;
+        let (mut best, mut off) = ((Law::Uniform(1.0), Law::Uniform(1.0), 0.5), f64::INFINITY);
+        for _ in 0..TRIES {
+            let [negative, positive] = [self.law(random), self.law(random)];
+            let beside = [negative.cumulated(1.0), positive.cumulated(1.0)];
+            let share = beside[0] / (beside[0] + beside[1]);
+            let within = share.clamp(low, high);
+            if (share - within).abs() < off {
+                off = (share - within).abs();
+                best = (negative, positive, within);
+            }
+            if off <= 0.0 {
+                break;
+            }
+        }
+        let (negative, positive, share) = best;
+        ContactDistribution::from_laws(1.0, negative, positive, share)
+    }
+
+    /// A law whose density falls from the interface on.
     fn law(&self, random: &mut ChaCha8Rng) -> Law {
         let length = log_even(random, self.lengths);
-        match random.random_range(0..5) {
+        match random.random_range(0..4) {
             0 => Law::Uniform(2.0 * length),
             1 => Law::Disc(3.0 * length),
             2 => Law::Exponential(length),
-            3 => Law::Rayleigh(0.8 * length),
-            _ => Law::Bell {
-                mean: length,
-                deviation: 0.4 * length,
-            },
+            // Between discs so dense that the density does not rise: 2 π λ R² = 1.5.
+            _ => {
+                let radius = 1.5 * length;
+                let intensity = 0.75 / (PI * radius * radius);
+                Law::Boolean { radius, intensity }
+            }
         }
     }
 

@@ -6,11 +6,18 @@ use crate::dual::{DualGraph, spread};
 ///
 /// Any mixture (1 − m) low + m high with one m obeys the bounds between the others too, because both are functions that change by no more than the distance; so does max(low, min(high, f)) of any such function f.
 pub(crate) fn bounds(graph: &DualGraph, labelled: &[bool], labels: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    // Labels do not bind each other any more: only those beside triangles without one are sources.
+    let beside: Vec<usize> = (0..graph.len())
+        .filter(|&t| labelled[t] && graph.links(t).iter().any(|link| !labelled[link.to as usize]))
+        .collect();
     let from = |sign: f64| {
-        let mut bound = vec![f64::NEG_INFINITY; graph.len()];
-        let given = (0..graph.len()).filter(|&t| labelled[t]);
+        let given = labelled.iter().zip(labels);
+        let mut bound: Vec<f64> = given
+            .map(|(&known, x)| if known { sign * x } else { f64::NEG_INFINITY })
+            .collect();
         #[allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
-        spread(graph, &mut bound, given.map(|t| (t as u32, sign * labels[t])));
+        let sources: Vec<(u32, f64)> = beside.iter().map(|&t| (t as u32, bound[t])).collect();
+        spread(graph, &mut bound, &sources);
         bound
     };
     let upper = from(-1.0).into_iter().map(|bound| -bound).collect();

@@ -1,7 +1,7 @@
 //! Meshes made fine enough to carry the relief (section 4.4: split triangles until the mesh is fine enough).
 #![allow(
     clippy::cast_possible_truncation,
-    reason = "more vertices than 32 bits number are refused before"
+    reason = "more triangles than 32 bits number are refused before"
 )]
 
 use std::f64::consts::TAU;
@@ -49,21 +49,24 @@ pub fn refined(mesh: &TriangleMesh, scheme: Subdivision, edge_length: f64) -> Re
     if scheme == Subdivision::Loop {
         while mean_edge(&mesh) > edge_length {
             check_count(4 * mesh.triangles.len(), edge_length)?;
-            mesh = split(&mesh, &edges(&mesh), |_| true, true);
+            let edges = Edges::of(&mesh);
+            let all = vec![true; edges.ends.len()];
+            mesh = split(&mesh, &edges, &all, true);
         }
     }
     loop {
-        let all = edges(&mesh);
-        let long: Vec<bool> = all
+        let edges = Edges::of(&mesh);
+        let long: Vec<bool> = edges
+            .ends
             .iter()
-            .map(|edge| (mesh.vertices[edge.from as usize] - mesh.vertices[edge.to as usize]).norm() > edge_length)
+            .map(|&[from, to]| (mesh.vertices[from as usize] - mesh.vertices[to as usize]).norm() > edge_length)
             .collect();
         let count = long.iter().filter(|long| **long).count();
         if count == 0 {
             return Ok(mesh);
         }
         check_count(mesh.triangles.len() + 2 * count, edge_length)?;
-        mesh = split(&mesh, &all, |edge| long[edge], false);
+        mesh = split(&mesh, &edges, &long, false);
     }
 }
 
@@ -83,55 +86,85 @@ fn mean_edge(mesh: &TriangleMesh) -> f64 {
     lengths.sum::<f64>() / (3 * mesh.triangles.len()).max(1) as f64
 }
 
-/// An edge, and the corners opposite to it in its triangles.
-struct Edge {
-    from: u32,
-    to: u32,
-    opposite: Vec<u32>,
+/// The edges of a mesh, in order of their vertices.
+struct Edges {
+    /// Lower vertex first.
+    ends: Vec<[u32; 2]>,
+    /// The edge from corner k of triangle t to the next, at 3 t + k.
+    of_side: Vec<u32>,
 }
 
-fn edges(mesh: &TriangleMesh) -> Vec<Edge> {
-    let mut sides: Vec<(u32, u32, u32)> = mesh
-        .triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [(a, b, c), (b, c, a), (c, a, b)])
-        .map(|(from, to, opposite)| (from.min(to), from.max(to), opposite))
-        .collect();
-    sides.sort_unstable();
-    sides
-        .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
-        .map(|same| Edge {
-            from: same[0].0,
-            to: same[0].1,
-            opposite: same.iter().map(|side| side.2).collect(),
-        })
-        .collect()
+impl Edges {
+    /// Sorted by the lower vertex by counting, then each vertex's few edges among themselves.
+    fn of(mesh: &TriangleMesh) -> Self {
+        let sides = || mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut starts = vec![0_u32; mesh.vertices.len() + 1];
+        for [a, b] in sides() {
+            starts[a.min(b) as usize + 1] += 1;
+        }
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut next = starts.clone();
+        let mut upper = vec![(0_u32, 0_u32); 3 * mesh.triangles.len()];
+        for (side, [a, b]) in sides().enumerate() {
+            let place = &mut next[a.min(b) as usize];
+            upper[*place as usize] = (a.max(b), side as u32);
+            *place += 1;
+        }
+        let mut made = Self {
+            ends: Vec::with_capacity(upper.len() / 2),
+            of_side: vec![0; upper.len()],
+        };
+        for (from, ends) in starts.windows(2).enumerate() {
+            let of_vertex = &mut upper[ends[0] as usize..ends[1] as usize];
+            of_vertex.sort_unstable();
+            for same in of_vertex.chunk_by(|a, b| a.0 == b.0) {
+                for &(_, side) in same {
+                    made.of_side[side as usize] = made.ends.len() as u32;
+                }
+                made.ends.push([from as u32, same[0].0]);
+            }
+        }
+        made
+    }
+
+    /// The corners opposite to each edge, and how many triangles it has; with more than two of them, two.
+    fn opposite(&self, mesh: &TriangleMesh) -> Vec<([u32; 2], u32)> {
+        let mut opposite = vec![([0; 2], 0); self.ends.len()];
+        for (t, corners) in mesh.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (of, count) = &mut opposite[self.of_side[3 * t + k] as usize];
+                of[(*count).min(1) as usize] = corners[(k + 2) % 3];
+                *count += 1;
+            }
+        }
+        opposite
+    }
 }
 
-/// Splits the edges that `chosen` chooses; with `smooth` vertices move by Loop's rules (1987; borders by Hoppe 1994).
-fn split(mesh: &TriangleMesh, edges: &[Edge], chosen: impl Fn(usize) -> bool, smooth: bool) -> TriangleMesh {
+/// Splits the edges that are `chosen`; with `smooth` vertices move by Loop's rules (1987; borders by Hoppe 1994).
+fn split(mesh: &TriangleMesh, edges: &Edges, chosen: &[bool], smooth: bool) -> TriangleMesh {
     let at = |v: u32| mesh.vertices[v as usize].coords;
+    let opposite = if smooth { edges.opposite(mesh) } else { Vec::new() };
     let mut vertices = if smooth {
-        smoothed(mesh, edges)
+        smoothed(mesh, edges, &opposite)
     } else {
         mesh.vertices.clone()
     };
-    let mut middles = vec![u32::MAX; edges.len()];
-    for (number, edge) in edges.iter().enumerate().filter(|(number, _)| chosen(*number)) {
-        let middle = match edge.opposite[..] {
-            [c, d] if smooth => 0.375 * (at(edge.from) + at(edge.to)) + 0.125 * (at(c) + at(d)),
-            _ => 0.5 * (at(edge.from) + at(edge.to)),
+    let mut middles = vec![u32::MAX; edges.ends.len()];
+    for (number, &[from, to]) in edges.ends.iter().enumerate().filter(|(number, _)| chosen[*number]) {
+        let middle = match opposite.get(number) {
+            Some(([c, d], 2)) => 0.375 * (at(from) + at(to)) + 0.125 * (at(*c) + at(*d)),
+            _ => 0.5 * (at(from) + at(to)),
         };
         middles[number] = vertices.len() as u32;
         vertices.push(Point3::from(middle));
     }
-    let middle = |a: u32, b: u32| {
-        let place = edges.partition_point(|edge| (edge.from, edge.to) < (a.min(b), a.max(b)));
-        Some(middles[place]).filter(|&m| m != u32::MAX)
-    };
-    let mut triangles = Vec::with_capacity(mesh.triangles.len() + 2 * edges.len());
-    for &[a, b, c] in &mesh.triangles {
-        match [middle(a, b), middle(b, c), middle(c, a)] {
+    let mut triangles = Vec::with_capacity(mesh.triangles.len() + 2 * (vertices.len() - mesh.vertices.len()));
+    for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+        let middle = |k: usize| Some(middles[edges.of_side[3 * t + k] as usize]).filter(|&m| m != u32::MAX);
+        match [middle(0), middle(1), middle(2)] {
             [Some(ab), Some(bc), Some(ca)] => {
                 triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
             }
@@ -159,16 +192,12 @@ fn two_split(vertices: &[Point3<f64>], triangles: &mut Vec<[u32; 3]>, [a, ab, b,
 }
 
 /// Vertices drawn towards their neighbours by Loop's weight, on borders along the border alone.
-fn smoothed(mesh: &TriangleMesh, edges: &[Edge]) -> Vec<Point3<f64>> {
+fn smoothed(mesh: &TriangleMesh, edges: &Edges, opposite: &[([u32; 2], u32)]) -> Vec<Point3<f64>> {
     let zero = (Vector3::zeros(), 0_u32);
     let (mut inner, mut border) = (vec![zero; mesh.vertices.len()], vec![zero; mesh.vertices.len()]);
-    for edge in edges {
-        let sums = if edge.opposite.len() == 2 {
-            &mut inner
-        } else {
-            &mut border
-        };
-        for (to, from) in [(edge.from, edge.to), (edge.to, edge.from)] {
+    for (&[a, b], (_, triangles)) in edges.ends.iter().zip(opposite) {
+        let sums = if *triangles == 2 { &mut inner } else { &mut border };
+        for (to, from) in [(a, b), (b, a)] {
             sums[to as usize].0 += mesh.vertices[from as usize].coords;
             sums[to as usize].1 += 1;
         }

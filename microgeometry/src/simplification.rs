@@ -7,8 +7,6 @@ use std::collections::BinaryHeap;
 use nalgebra::{Matrix3, Point3, Vector3};
 use stereology_shape::TriangleMesh;
 
-use crate::dual::rank;
-
 /// Borders are kept as if planes of so many times their weight stood on them.
 const BORDER: f64 = 100.0;
 /// A triangle may not turn by more than about 78°.
@@ -314,4 +312,10 @@ impl Collapse {
             values,
         }
     }
+}
+
+/// Whole numbers in the order of the floats.
+fn rank(x: f64) -> u64 {
+    let bits = x.to_bits();
+    if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }

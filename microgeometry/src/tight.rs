@@ -9,21 +9,19 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::bounds::{Limit, Region};
 use crate::budget::{Levels, take_share};
-use crate::dual::DualGraph;
+use crate::dual::{DualGraph, Link};
 use crate::error::MicrogeometryError;
 use crate::leftovers::bounds;
 use crate::reconstruction::Labelling;
 
-/// Steps that may be spent on seeds that are refused, for each triangle without a label and level.
-const PATIENCE: u64 = 1;
 /// Refusals in a row after which no seed farther from its region is tried.
 const REFUSALS: u32 = 32;
 /// How often the candidates are put in order again.
-const ROUNDS: u32 = 16;
+const ROUNDS: u32 = 2;
 
 /// Seeds are tried in order of slack + APART × distance to the own region + CHANCE × a random share of a bin, both distances up to REACH bins.
 ///
-/// Of random fields on four meshes, APART 0 leaves the distances measured afterwards .26 to .5 bins off, .4 .2 to .35; a reach of 6 bins makes one large clump (1 to 6 bins off). CHANCE between .1 and 1 does not matter to them.
+/// Of random fields on four meshes, APART 0 leaves the distances measured afterwards .26 to .5 bins off, .4 .2 to .35; a reach of 6 bins makes one large clump (1 to 6 bins off). CHANCE between .1 and 1 does not matter to them. Once the interface has been moved, nor does APART.
 const APART: f64 = 0.4;
 const CHANCE: f64 = 0.3;
 const REACH: f64 = 2.0;
@@ -36,8 +34,22 @@ pub(crate) struct Tight<'a> {
     pub(crate) bin: f64,
     pub(crate) tolerance: i64,
     pub(crate) seed: u64,
+    /// The interface, if it is given.
+    pub(crate) shore: Option<Shore<'a>>,
     pub(crate) progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
 }
+
+/// A given interface: labels get the signs of these distances to it.
+#[derive(Clone, Copy)]
+pub(crate) struct Shore<'a> {
+    /// Signed.
+    pub(crate) distance: &'a [f64],
+    /// May labels be as long as the way to the nearest triangle of the other region, half an edge longer than the distance? Where triangles are as large as bins that is needed to fill the bins; where they are small it costs time.
+    pub(crate) across: bool,
+}
+
+/// Steps that may be spent on seeds that are refused, for each triangle without a label and level: tenths, without and with a given interface. Ten times as many change the earth mover's distances by less than .01.
+const PATIENCE: [u64; 2] = [10, 1];
 
 /// How candidates are tried.
 struct Pass {
@@ -67,6 +79,16 @@ impl Tight<'_> {
             labelled: vec![false; count],
             label: vec![0.0; count],
         };
+        if let Some(Shore { distance, across }) = self.shore {
+            let ways = across.then(|| to_the_other_region(self.graph, distance));
+            let longest = ways.as_deref().unwrap_or(distance);
+            // A piece without interface is labelled freely.
+            for (t, x) in distance.iter().enumerate().filter(|(_, x)| x.is_finite()) {
+                let own = usize::from(!x.is_sign_negative());
+                state.regions[own].bound[t] = 0.0;
+                state.regions[1 - own].bound[t] = -longest[t].abs();
+            }
+        }
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let dice: Vec<f32> = (0..count).map(|_| random.random()).collect();
         let mut rest_rooms = vec![[0_i64; 2]; self.graph.pieces().len()];
@@ -160,7 +182,7 @@ impl Tight<'_> {
                 candidates.push(key(cost, t));
             }
         }
-        let mut patience = PATIENCE * open.len() as u64;
+        let mut patience = PATIENCE[usize::from(self.shore.is_some())] * open.len() as u64 / 10;
         let batch = room[side][level];
         self.place(
             state,
@@ -190,7 +212,7 @@ impl Tight<'_> {
                         t,
                     );
                 }
-                let mut patience = PATIENCE * open.len() as u64;
+                let mut patience = PATIENCE[usize::from(self.shore.is_some())] * open.len() as u64 / 10;
                 let pass = Pass {
                     batch: 1,
                     refusals: REFUSALS,
@@ -217,7 +239,12 @@ impl Tight<'_> {
     ) -> bool {
         let mut batch = pass.batch;
         let value = level as f64 * self.height;
-        let floor = -value - self.bin;
+        // Labels within their distances to a given interface cannot come too near to the other region.
+        let floor = if self.shore.is_some_and(|shore| !shore.across) {
+            0.0
+        } else {
+            -value - self.bin
+        };
         let (mut sorted, mut next, mut refused, mut placed) = (0, 0, 0, false);
         let mut seeds: Vec<u32> = Vec::new();
         while room[side][level] > 0 && next < candidates.len() {
@@ -297,6 +324,14 @@ impl Tight<'_> {
                     (lower[t as usize], upper[t as usize])
                 }
             };
+            if let Some(Shore { distance, .. }) = self.shore.filter(|of| of.distance[piece[0] as usize].is_finite()) {
+                for &t in &open {
+                    let x = distance[t as usize].clamp(-within, within);
+                    let (low, high) = allowed(t);
+                    state.label[t as usize] = x.max(low).min(high);
+                }
+                continue;
+            }
             // The mixture (1 − m) low + m high of a triangle is positive for m above this.
             let turns = |t: u32| {
                 let (low, high) = allowed(t);
@@ -348,6 +383,21 @@ impl Tight<'_> {
         }
         left
     }
+}
+
+/// How far each triangle's centroid is from the nearest of the other region.
+fn to_the_other_region(graph: &DualGraph, distance: &[f64]) -> Vec<f64> {
+    let shore = (0..graph.len()).filter_map(|t| {
+        let beyond = |link: &&Link| distance[link.to as usize].is_sign_negative() != distance[t].is_sign_negative();
+        let near = graph
+            .links(t)
+            .iter()
+            .filter(beyond)
+            .map(|link| link.length())
+            .reduce(f64::min)?;
+        Some((t, near))
+    });
+    graph.distances(&shore.collect::<Vec<_>>())
 }
 
 /// A value of a region as a label, or back.

@@ -16,6 +16,9 @@ use crate::winding::coord;
 /// Crossings shallower than this part of the mesh's extent are rounding: files in single precision hold 24 bits.
 pub(crate) const ROUNDING: f64 = 1e-7;
 
+/// Heights above this share of the product of their lengths have the sign they seem to have: rounding is below 10⁻¹⁴ of it.
+const FILTER: f64 = 1e-10;
+
 /// Enough crossings to say that a mesh is broken.
 const MOST: usize = 1000;
 
@@ -76,6 +79,9 @@ fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: 
         return false;
     }
     let (a, b) = (mesh.corners(t as usize), mesh.corners(s as usize));
+    if clearly_beside(&a, &b, tolerance) || clearly_beside(&b, &a, tolerance) {
+        return false;
+    }
     let (sides_a, sides_b) = (sides(&a, &b), sides(&b, &a));
     let apart = |sides: &[i8; 3]| sides.iter().all(|&s| s > 0) || sides.iter().all(|&s| s < 0);
     let (heights_a, heights_b) = (heights(&a, &b), heights(&b, &a));
@@ -93,6 +99,26 @@ fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: 
         return true;
     }
     edge_passes(mesh, across, t, &sides_a, &b, tolerance) || edge_passes(mesh, across, s, &sides_b, &a, tolerance)
+}
+
+/// Do all corners but shared ones lie on one side of a plane, farther off than the tolerance and any rounding? Then nothing crosses: what is in the plane besides a shared corner belongs to the other triangle alone. Most pairs of neighbours are that simple.
+fn clearly_beside(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3], tolerance: f64) -> bool {
+    let [u, v] = [plane[1] - plane[0], plane[2] - plane[0]];
+    let normal = u.cross(&v);
+    let (length, rounding) = (normal.norm(), FILTER * u.norm() * v.norm());
+    let mut side = 0.0;
+    for p in corners {
+        if plane.contains(p) {
+            continue;
+        }
+        let d = p - plane[0];
+        let height = normal.dot(&d);
+        if !(height.abs() > tolerance * length && height.abs() > rounding * d.norm() && height * side >= 0.0) {
+            return false;
+        }
+        side = height;
+    }
+    side != 0.0
 }
 
 /// On which side of the plane of `plane` each corner lies: 1 where its normal points, -1, or 0; exact.

@@ -14,20 +14,46 @@ struct Side {
     corner: u8,
 }
 
+/// All sides in order: by the lower vertex by counting, then each vertex's few among themselves.
 fn sorted_sides(mesh: &TriangleMesh) -> Vec<Side> {
-    let mut sides: Vec<Side> = Vec::with_capacity(3 * mesh.triangles.len());
+    let vertices = mesh
+        .triangles
+        .iter()
+        .flatten()
+        .max()
+        .map_or(0, |&most| most as usize + 1);
+    let mut starts = vec![0_usize; vertices + 1];
+    for &[a, b, c] in &mesh.triangles {
+        for lower in [a.min(b), b.min(c), c.min(a)] {
+            starts[lower as usize + 1] += 1;
+        }
+    }
+    for v in 1..starts.len() {
+        starts[v] += starts[v - 1];
+    }
+    let mut next = starts.clone();
+    let none = Side {
+        edge: (0, 0),
+        triangle: 0,
+        corner: 0,
+    };
+    let mut sides = vec![none; 3 * mesh.triangles.len()];
     for (t, corners) in mesh.triangles.iter().enumerate() {
         for corner in 0..3_u8 {
             let k = usize::from(corner);
             let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            sides.push(Side {
+            let place = &mut next[a.min(b) as usize];
+            sides[*place] = Side {
                 edge: (a.min(b), a.max(b)),
                 triangle: index(t),
                 corner,
-            });
+            };
+            *place += 1;
         }
     }
-    sides.sort_unstable();
+    for ends in starts.windows(2) {
+        sides[ends[0]..ends[1]].sort_unstable();
+    }
     sides
 }
 

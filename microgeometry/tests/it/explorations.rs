@@ -1,7 +1,10 @@
 //! Random designs stay in their ranges and can be written and read.
 
 use proptest::prelude::*;
-use stereology_microgeometry::{Design, Direction, Exploration};
+use stereology_microgeometry::{Design, Direction, Exploration, ReconstructOptions};
+use stereology_shape::TriangleMesh;
+
+use crate::on;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
@@ -20,6 +23,50 @@ proptest! {
         prop_assert!((near.units / design.units).ln().abs() <= 0.1 + 1e-12);
         prop_assert!(near.contact.earth_movers_distance(&design.contact) < 1.0);
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// What is drawn is what a surface can have: densities fall from the interface on, and as much of one region lies next to it as of the other.
+    #[test]
+    fn drawn_distributions_can_be_had(seed in any::<u32>(), number in 0..1000_u64) {
+        let of = Exploration::default().design(u64::from(seed), number).unwrap().contact;
+        for side in [of.negative(), of.positive()] {
+            for pair in side.windows(2) {
+                prop_assert!(pair[1] <= pair[0] * (1.0 + 1e-9) + 1e-12, "{side:?}");
+            }
+        }
+        let (one, other) = (of.negative()[0], of.positive()[0]);
+        prop_assert!((one / other).ln().abs() < 0.05, "{one} {other}");
+    }
+}
+
+/// And surfaces have them: distances measured again are as the distribution asks.
+#[test]
+fn drawn_distributions_are_measured_again() {
+    let ball = TriangleMesh::icosphere(2.0, 5);
+    let mut off: Vec<f64> = (0..6)
+        .map(|number| {
+            let design = Exploration {
+                units: [30.0, 40.0],
+                lengths: [1.0, 4.0],
+                ..Exploration::default()
+            }
+            .design(3, number)
+            .unwrap();
+            let made = on(
+                &ball,
+                design.units,
+                &design.contact,
+                &ReconstructOptions::default().with_seed(design.seed),
+            );
+            assert!(made.emd_labels < 0.1, "{number}: {}", made.emd_labels);
+            made.emd_measured.unwrap()
+        })
+        .collect();
+    off.sort_by(f64::total_cmp);
+    assert!(off[3] < 0.3 && off[5] < 0.6, "{off:?}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use stereology_microgeometry::{
-    EdgeCensus, Method, Offset, ReconstructOptions, Weighting, displace, refined, simplified,
+    ContactDistribution, EdgeCensus, Method, Offset, ReconstructOptions, Weighting, displace, refined, simplified,
 };
 use stereology_shape::{ClosedMesh, Subdivision, TriangleMesh};
 
@@ -58,6 +58,24 @@ fn loop_works_on_open_meshes() {
     assert!(EdgeCensus::of(&cup).border > 0 && EdgeCensus::of(&fine).crowded == 0);
     assert!(EdgeCensus::of(&fine).border >= 2 * EdgeCensus::of(&cup).border);
     assert!((area(&fine) / area(&cup) - 1.0).abs() < 0.1);
+}
+
+/// One region alone has no interface: labels are distributed as asked all the same, on small triangles and on large ones.
+#[test]
+fn one_region_is_labelled_too() {
+    for (negative, positive) in [(vec![], vec![3.0, 2.0, 1.0]), (vec![3.0, 2.0, 1.0], vec![])] {
+        for units in [4.0, 30.0] {
+            let of = ContactDistribution::new(1.0, negative.clone(), positive.clone()).unwrap();
+            let made = on(
+                &TriangleMesh::icosphere(2.0, 4),
+                units,
+                &of,
+                &ReconstructOptions::default(),
+            );
+            assert_eq!((made.violations, made.emd_measured), (0, None));
+            assert!(made.emd_labels < 0.1, "{units} {}", made.emd_labels);
+        }
+    }
 }
 
 /// Every piece gets its share of both regions.

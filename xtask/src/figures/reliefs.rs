@@ -78,11 +78,10 @@ fn fine(mesh: TriangleMesh, edge: f64) -> Result<TriangleMesh> {
     Ok(refined(&mesh, Subdivision::Midpoint, edge)?)
 }
 
+/// A box with rounded edges: split first, so that Loop's scheme rounds the edges alone.
 fn bar() -> Result<TriangleMesh> {
-    fine(
-        Body::superellipsoid([1.0, 0.36, 0.42], [0.35, 0.35])?.to_triangles(5),
-        0.028,
-    )
+    let boxy = fine(TriangleMesh::cuboid([2.0, 0.72, 0.84]), 0.22)?;
+    Ok(refined(&boxy, Subdivision::Loop, 0.028)?)
 }
 
 fn disc() -> Result<TriangleMesh> {
@@ -100,18 +99,24 @@ fn ring() -> TriangleMesh {
     TriangleMesh::torus(1.4, 0.6, 200, 90)
 }
 
-/// A leaf-shaped blade with a waist: an arrowhead.
+/// From 0 to 1 between two places, without corners.
+fn smooth(from: f64, to: f64, at: f64) -> f64 {
+    let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// An arrowhead: a tang, barbs, a tip.
 fn blade() -> Result<TriangleMesh> {
-    let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
-        let (x, y, z) = (p.x, p.y, p.z);
-        let waist = if y < -0.45 {
-            0.45
-        } else {
-            1.0 - 0.55 * ((y + 0.45) / 1.45).max(0.0)
-        };
-        Point3::new(0.62 * waist * x, 1.1 * y, 0.16 * z * (1.0 - 0.6 * x * x))
+    let shaped = TriangleMesh::icosphere(2.0, 6).mapped(|p| {
+        let along = 0.5 * (p.y + 1.0);
+        let tang = 0.2 * smooth(0.0, 0.1, along);
+        let head = 0.72 * (1.0 - along).powf(0.85);
+        let wide = tang + (head - tang) * smooth(0.2, 0.32, along);
+        let round = p.x.hypot(p.z).max(1e-9);
+        let thick = 0.17 * (1.0 - along).sqrt() * smooth(0.0, 0.15, along);
+        Point3::new(wide * p.x / round, 1.05 * p.y, thick * p.z / round)
     });
-    fine(shaped, 0.028)
+    fine(shaped, 0.026)
 }
 
 /// A head of a kind: a long ellipsoid on a neck.
@@ -119,7 +124,7 @@ fn bust() -> Result<TriangleMesh> {
     let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
         let t = (PI * (p.y + 1.0) / 2.0).clamp(0.0, PI);
         let wide = 0.34 + 0.14 * (1.0 + (2.0 * (t - 2.1)).cos());
-        let nose = 0.22 * (-40.0 * (p.x * p.x + (p.y - 0.3).powi(2))).exp() * p.z.max(0.0);
+        let nose = 0.16 * (-16.0 * (p.x * p.x + (p.y - 0.25).powi(2))).exp() * p.z.max(0.0);
         Point3::new(wide * p.x, 1.1 * p.y, (wide * 1.1) * p.z + nose)
     });
     fine(shaped, 0.03)
@@ -157,7 +162,7 @@ fn relief(mesh: &TriangleMesh, of: &Recipe, seed: u64, side: u32) -> Result<RgbI
     let near = Nearest::new(&made.mesh);
     let [negative, positive] = of.colours;
     let colour = |p: &Point3<f64>| {
-        let value = near.vertex(p).map_or(0.0, |v| made.values[v]);
+        let value = near.mean(p, &made.values);
         // The regions' colours run into each other over a distance of two bins.
         let share = (0.5 + 0.5 * value).clamp(0.0, 1.0) as f32;
         [0, 1, 2].map(|c| negative[c] + share * (positive[c] - negative[c]))
@@ -191,7 +196,7 @@ fn chipped() -> Result<Recipe> {
 
 fn coral() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Disc(5.0), Law::Exponential(1.1), 0.35)?,
+        contact: laws(Law::Disc(5.0), Law::Disc(2.2), 0.34)?,
         units: 50.0,
         negative: "in,0.03,sqrt",
         positive: "out,0.006,sqrt",
@@ -201,7 +206,7 @@ fn coral() -> Result<Recipe> {
 
 fn crisped() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Uniform(2.2), Law::Disc(4.2), 0.62)?,
+        contact: laws(Law::Uniform(2.2), Law::Disc(4.2), 0.52)?,
         units: 40.0,
         negative: "none",
         positive: "out,0.03,sqrt",
@@ -211,17 +216,17 @@ fn crisped() -> Result<Recipe> {
 
 fn clay() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Exponential(1.8), Law::Disc(4.0), 0.45)?,
+        contact: laws(Law::Disc(5.0), Law::Disc(6.0), 0.54)?,
         units: 30.0,
-        negative: "in,0.015,x",
-        positive: "out,0.02,sqrt",
+        negative: "in,0.02,sqrt",
+        positive: "out,0.012,sqrt",
         colours: [[0.34, 0.3, 0.27], [0.52, 0.47, 0.42]],
     })
 }
 
 fn planet() -> Result<Recipe> {
     Ok(Recipe {
-        contact: laws(Law::Exponential(5.0), Law::Exponential(2.5), 0.33)?,
+        contact: laws(Law::Exponential(5.0), Law::Exponential(2.5), 0.35)?,
         units: 36.65,
         negative: "none",
         positive: "out,0.016,sqrt",
@@ -528,6 +533,27 @@ impl<'a> Nearest<'a> {
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.sides[1] + y) * self.sides[0] + x
+    }
+
+    /// Mean of the values about a point, the near ones above all.
+    fn mean(&self, p: &Point3<f64>, values: &[f64]) -> f64 {
+        let place = self.place(p);
+        let range = |k: usize| place[k].saturating_sub(1)..=(place[k] + 1).min(self.sides[k] - 1);
+        let (mut sum, mut of) = (0.0, 1e-300);
+        for z in range(2) {
+            for y in range(1) {
+                for x in range(0) {
+                    let cell = self.index([x, y, z]);
+                    for &v in &self.order[self.starts[cell]..self.starts[cell + 1]] {
+                        let far = (self.points[v as usize] - p).norm_squared() / (self.cell * self.cell);
+                        let weight = (-16.0 * far).exp();
+                        sum += weight * values[v as usize];
+                        of += weight;
+                    }
+                }
+            }
+        }
+        sum / of
     }
 
     fn vertex(&self, p: &Point3<f64>) -> Option<usize> {

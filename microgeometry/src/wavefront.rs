@@ -1,0 +1,113 @@
+//! Triangles in the order in which falling values reach them: a queue of buckets.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "numbers of buckets saturate"
+)]
+
+/// Buckets in reach of the current one; what lies farther waits aside.
+const BUCKETS: usize = 1024;
+
+/// Values with their triangles, taken out from the highest bucket to the lowest; within a bucket in any order.
+///
+/// A search over a graph with such a queue gives what it would give with an exact one: a triangle whose value is raised again while its bucket is emptied is put in again. No bucket is left before it is empty, so with buckets narrower than an edge that is seldom.
+/// Putting in and taking out cost constant time.
+pub(crate) struct Wavefront {
+    /// Buckets per unit of value.
+    per_unit: f64,
+    /// Highest value of the first bucket.
+    top: f64,
+    buckets: Vec<Vec<(f64, u32)>>,
+    /// The bucket that is being emptied.
+    at: usize,
+    /// No bucket behind this one holds anything.
+    last: usize,
+    beyond: Vec<(f64, u32)>,
+}
+
+impl Wavefront {
+    /// With buckets of this width, or of 1 if it is none.
+    pub(crate) fn new(width: f64) -> Self {
+        let per_unit = width.recip();
+        Self {
+            per_unit: if per_unit.is_finite() && per_unit > 0.0 {
+                per_unit
+            } else {
+                1.0
+            },
+            top: 0.0,
+            buckets: vec![Vec::new(); BUCKETS],
+            at: 0,
+            last: 0,
+            beyond: Vec::new(),
+        }
+    }
+
+    /// Empties it, to be filled with values from `top` downwards.
+    pub(crate) fn restart(&mut self, top: f64) {
+        for bucket in &mut self.buckets[self.at..=self.last] {
+            bucket.clear();
+        }
+        self.beyond.clear();
+        (self.top, self.at, self.last) = (top, 0, 0);
+    }
+
+    pub(crate) fn push(&mut self, value: f64, triangle: u32) {
+        // What is above the bucket that is being emptied comes out of it, next.
+        let place = (((self.top - value) * self.per_unit) as usize).max(self.at);
+        if place < BUCKETS {
+            self.buckets[place].push((value, triangle));
+            self.last = self.last.max(place);
+        } else {
+            self.beyond.push((value, triangle));
+        }
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<(f64, u32)> {
+        loop {
+            if let Some(next) = self.buckets[self.at].pop() {
+                return Some(next);
+            }
+            if self.at < self.last {
+                self.at += 1;
+                continue;
+            }
+            if self.beyond.is_empty() {
+                return None;
+            }
+            let waiting = std::mem::take(&mut self.beyond);
+            self.top = waiting.iter().fold(f64::NEG_INFINITY, |most, next| most.max(next.0));
+            (self.at, self.last) = (0, 0);
+            for (value, triangle) in waiting {
+                self.push(value, triangle);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Wavefront;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// What goes in comes out, from high to low within the width of a bucket, however far values lie apart.
+        #[test]
+        fn values_fall(values in prop::collection::vec(-1e4..0.0_f64, 1..200), width in 1e-3..10.0_f64) {
+            let mut front = Wavefront::new(width);
+            front.restart(0.0);
+            for (i, &value) in values.iter().enumerate() {
+                front.push(value, i as u32);
+            }
+            let mut out: Vec<f64> = Vec::new();
+            while let Some((value, i)) = front.pop() {
+                prop_assert_eq!(value.to_bits(), values[i as usize].to_bits());
+                if let Some(last) = out.last() {
+                    prop_assert!(value < last + width * (1.0 + 1e-6));
+                }
+                out.push(value);
+            }
+            prop_assert_eq!(out.len(), values.len());
+        }
+    }
+}

@@ -5,6 +5,7 @@ mod bench_report;
 mod figures;
 mod grown_stones;
 mod label_scores;
+mod laminar_study;
 mod particle_noise;
 mod relief_table;
 mod renderer_check;

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use ndarray::{Array3, Array4};
+use ndarray::{Array3, Array4, ArrayView3};
 
 use crate::feature_size::levels_for;
 use crate::field::Field;
@@ -83,7 +83,7 @@ pub fn synthesize_solid(
     options: &SolidOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<Solid, SolidError> {
-    synthesize_solid_watched(exemplars, domain, options, progress, &mut |_| ())
+    synthesize(exemplars, domain, options, None, progress, &mut |_| ())
 }
 
 /// [`synthesize_solid`], which shows `watch` the solid after each iteration of each level.
@@ -118,6 +118,18 @@ pub fn synthesize_solid_watched(
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
     watch: &mut dyn FnMut(&Iteration<'_>),
 ) -> Result<Solid, SolidError> {
+    synthesize(exemplars, domain, options, None, progress, watch)
+}
+
+/// A solid whose slices look like the exemplars; `begin` are the pixels that its voxels show at first, random ones if `None`.
+pub(crate) fn synthesize(
+    exemplars: &[Exemplar],
+    domain: &Domain,
+    options: &SolidOptions,
+    begin: Option<ArrayView3<'_, u32>>,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    watch: &mut dyn FnMut(&Iteration<'_>),
+) -> Result<Solid, SolidError> {
     check(exemplars, domain, options)?;
     let recipe = Recipe::new(options, exemplars[0].phases().is_some());
     let levels = levels(exemplars, domain, options, &recipe)?;
@@ -137,7 +149,12 @@ pub fn synthesize_solid_watched(
         let level = Level::new(exemplars, &stacks, &atlas, number, window.half, recipe.thinned);
         let mut field = field_at(domain, number, exemplars, &level);
         match before.take() {
-            None => field.begin(&level, views, options.seed),
+            None => {
+                field.begin(&level, views, options.seed);
+                if let Some(pixels) = begin {
+                    field.begin_with(&level, pixels);
+                }
+            }
             Some((coarse, from)) => field.refine(&coarse, &from, &level, &atlas, recipe.combine != Combine::Discrete),
         }
         let stage = Stage::new(
@@ -167,8 +184,13 @@ pub fn synthesize_solid_watched(
             let mut unchanged = false;
             match options.solver() {
                 Solver::Batch => {
-                    energies.push(stage.search(&mut field, &mut tallies, iteration));
-                    cancelled(progress(done + share / 2.0))?;
+                    let go_on = |part: f64| progress(done + part * share * 0.75);
+                    let ControlFlow::Continue(energy) = stage.search(&mut field, &mut tallies, iteration, &go_on)
+                    else {
+                        return Err(SolidError::Cancelled);
+                    };
+                    energies.push(energy);
+                    cancelled(progress(done + share * 0.75))?;
                     stage.vote(&mut field, &mut tallies, recipe.radius(iteration, options.iterations));
                 }
                 Solver::Sequential => {

@@ -337,8 +337,17 @@ fn stopping_leaves_nothing() {
     let at = |name: &str| path(&folder, name);
     write_layers(&at("layers.png"));
     for command in [
-        vec!["exemplar", "--size", "96", "--search", "exact"],
-        vec!["grow", "box:1,1,1", "--resolution", "200", "--search", "exact"],
+        vec!["exemplar", "--size", "48", "--iterations", "1000"],
+        vec![
+            "grow",
+            "box:1,1,1",
+            "--resolution",
+            "60",
+            "--search",
+            "exact",
+            "--window",
+            "9",
+        ],
     ] {
         let (layers, out) = (at("layers.png"), at("o.npy"));
         let mut arguments = command.clone();

@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use stereology::exemplar::{Method, Scan};
 
 use super::bars::{BLUE, GREEN, RED, table as csv};
-use super::growing::row;
+use super::growing::{column, row};
 use super::lines::{Chart, Line, draw as chart};
 use crate::laminar_study::{Case, HEAD, METHODS, Moment, Outcome, SCANS, band_passed, learning, ratio, run, table};
 use crate::texture_table::replace_between;
@@ -46,7 +46,7 @@ pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
             })
             .collect()
     };
-    let (undulation, strength, background) = (waves(110.0, 55.0), waves(90.0, 40.0), waves(120.0, 120.0));
+    let (undulation, strength, background) = (waves(90.0, 160.0), waves(90.0, 40.0), waves(120.0, 120.0));
     let sum = |waves: &[[f64; 3]], y: f64, x: f64| -> f64 {
         waves
             .iter()
@@ -54,7 +54,7 @@ pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
             .sum::<f64>()
             / 8.0_f64.sqrt()
     };
-    let ends: Vec<[f64; 3]> = (0..side * side / 900)
+    let ends: Vec<[f64; 3]> = (0..side * side / 450)
         .map(|i| {
             let [y, x] = [0; 2].map(|_| rng.random::<f64>() * side as f64);
             [y, x, if i % 2 == 0 { 1.0 } else { -1.0 }]
@@ -75,10 +75,16 @@ pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
     })
 }
 
-/// Draws all of it.
-pub fn draw(folder: &Path) -> Result<()> {
+/// The picture that is studied, raw and band-passed.
+fn inputs() -> Result<[Array2<f32>; 2]> {
     let raw = fringe_picture(SIDE, 2012);
     let filtered = band_passed(&raw)?;
+    Ok([raw, filtered])
+}
+
+/// Slices, what happens from iteration to iteration, and fringes, at the paper's size.
+pub fn draw(folder: &Path) -> Result<()> {
+    let [raw, filtered] = inputs()?;
     let hilbert: Vec<Case> = METHODS
         .iter()
         .map(|(_, method)| *method)
@@ -96,12 +102,16 @@ pub fn draw(folder: &Path) -> Result<()> {
             .collect();
         row(&all)
     };
-    super::growing::column(&[pictures(&raw, &of_raw), pictures(&filtered, &of_filtered)])
+    column(&[pictures(&raw, &of_raw), pictures(&filtered, &of_filtered)])
         .save(folder.join("laminar-slices.png"))
         .context("laminar-slices.png")?;
     iterations(folder, &of_raw, &of_filtered)?;
-    fringes(folder, &of_raw[..4])?;
-    parameters(folder, &raw)?;
+    fringes(folder, &of_raw[..4])
+}
+
+/// All methods and scans, into docs/exemplar.md.
+pub fn draw_table(folder: &Path) -> Result<()> {
+    let [raw, filtered] = inputs()?;
     let mut text = format!("\n{HEAD}");
     text.push_str(&table("drawn", &raw, SMALL, 3, true)?);
     text.push_str(&table("drawn, band-passed", &filtered, SMALL, 1, false)?);
@@ -237,7 +247,9 @@ fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
             .map(|(i, v)| at(i, v))
             .collect()
     };
-    let bars = |values: &[f64], width: f64| values.iter().enumerate().map(|(i, v)| (i as f64 * width, *v)).collect();
+    let bars = |values: &[f64], width: f64| -> Vec<(f64, f64)> {
+        values.iter().enumerate().map(|(i, v)| (i as f64 * width, *v)).collect()
+    };
     let all = [
         Chart {
             title: "Greys".into(),
@@ -248,13 +260,13 @@ fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
         },
         Chart {
             title: "Orientations".into(),
-            across: "degrees from the layers' mean, plus 90",
+            across: "degrees from the columns' axis",
             up: "share",
             ideal: None,
             lines: curves(&|o, side| {
                 let mut turned = o.found.curves.orientation[side].clone();
                 turned.rotate_right(18);
-                bars(&turned, 5.0)
+                bars(&turned, 5.0).into_iter().map(|(x, y)| (x - 90.0, y)).collect()
             }),
         },
         Chart {
@@ -294,7 +306,9 @@ fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
 }
 
 /// What k, levels, neighbourhood and the sizes of picture and solid do.
-fn parameters(folder: &Path, raw: &Array2<f32>) -> Result<()> {
+pub fn draw_parameters(folder: &Path) -> Result<()> {
+    let [raw, _] = inputs()?;
+    let raw = &raw;
     let kopf = Case::new(Method::Kopf, Scan::Hilbert, SMALL);
     let counts = [1, 2, 4, 8, 15, 30, 60];
     let by_k: Vec<Case> = counts
@@ -320,7 +334,14 @@ fn parameters(folder: &Path, raw: &Array2<f32>) -> Result<()> {
     let sides = [48, 64, 96, 128, 192, 256];
     let mut by_picture = Vec::new();
     for side in sides {
-        let levels = if side < SIDE { 4 } else { 5 };
+        // As many as leave four neighbourhoods at the coarsest.
+        let levels = if side < 64 {
+            3
+        } else if side < SIDE {
+            4
+        } else {
+            5
+        };
         by_picture.extend(run(&fringe_picture(side, 2012), &[Case { levels, ..kopf }])?);
     }
     let times: Vec<f64> = counts.iter().map(|&k| learning(raw, k)).collect::<Result<_>>()?;

@@ -57,7 +57,7 @@ fn draw_chart(
     let points = || chart.lines.iter().flat_map(|line| &line.points);
     let x = range(points().map(|p| p.0), 0.0, 0.0);
     // The legend stands above the lines.
-    let headroom = 0.1 + 0.085 * chart.lines.len() as f64;
+    let headroom = 0.15 + 0.14 * chart.lines.len() as f64;
     let y = range(points().map(|p| p.1).chain(chart.ideal), 0.05, headroom);
     let mut drawn = ChartBuilder::on(area)
         .margin(10)
@@ -71,6 +71,13 @@ fn draw_chart(
         .light_line_style(TRANSPARENT)
         .bold_line_style(INK.mix(0.1))
         .x_desc(chart.across)
+        .x_label_formatter(&|x| {
+            if x.fract() == 0.0 {
+                format!("{x:.0}")
+            } else {
+                format!("{x}")
+            }
+        })
         .y_desc(chart.up)
         .draw()?;
     if let Some(ideal) = chart.ideal {

@@ -133,7 +133,7 @@ pub fn laminar(data: &Path, page: &Path) -> Result<()> {
         text.push_str(&table(
             &format!("{name}, band-passed"),
             &band_passed(&raw)?,
-            64,
+            48,
             1,
             false,
         )?);

@@ -21,7 +21,8 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
     let (_, width) = mask.dim();
     // Pixels inside above each pixel of a row, itself included.
     let mut heights = vec![0_usize; width];
-    let mut best: Option<((usize, usize), Range<usize>, Range<usize>)> = None;
+    let mut most = (0, 0);
+    let mut best = None;
     for (y, row) in mask.rows().into_iter().enumerate() {
         for (height, &inside) in heights.iter_mut().zip(row) {
             *height = if inside { *height + 1 } else { 0 };
@@ -35,14 +36,14 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
                 open.pop();
                 from = start;
                 let worth = (tall.min(x - start), tall * (x - start));
-                if tall > 0 && best.as_ref().is_none_or(|(most, ..)| worth > *most) {
-                    best = Some((worth, y + 1 - tall..y + 1, start..x));
+                if worth > most {
+                    (most, best) = (worth, Some((y + 1 - tall..y + 1, start..x)));
                 }
             }
             open.push((from, height));
         }
     }
-    best.map(|(_, rows, columns)| (rows, columns))
+    best
 }
 
 /// As [`sections`](super::sections), of each slice the [`largest_rectangle`] inside a mask (z, y, x) of the volume's size: stone that fills a mesh is measured without the emptiness around it.

@@ -223,7 +223,8 @@ fn iterations(folder: &Path, raw: &[Outcome], filtered: &[Outcome]) -> Result<()
 
 /// Figures 7a, 8c and 10: distributions of greys, orientations, lengths and windings.
 fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
-    let curves = |of: &dyn Fn(&Outcome, usize) -> Vec<(f64, f64)>| {
+    type Points = Vec<(f64, f64)>;
+    let curves = |of: &dyn Fn(&Outcome, usize) -> Points| {
         let own = Line {
             name: "picture".into(),
             points: of(&outcomes[0], 0),

@@ -71,13 +71,7 @@ fn draw_chart(
         .light_line_style(TRANSPARENT)
         .bold_line_style(INK.mix(0.1))
         .x_desc(chart.across)
-        .x_label_formatter(&|x| {
-            if x.fract() == 0.0 {
-                format!("{x:.0}")
-            } else {
-                format!("{x}")
-            }
-        })
+        .x_label_formatter(&|x| ((1e3 * x).round() / 1e3).to_string())
         .y_desc(chart.up)
         .draw()?;
     if let Some(ideal) = chart.ideal {

@@ -98,14 +98,17 @@ impl Field {
         self.show(level);
     }
 
-    /// After [`Field::begin`], at the finest level: what these pixels (z, y, x) show, where they are any, and the windows about them.
+    /// After [`Field::begin`]: what these pixels (z, y, x at the finest level) show, where they are any, and the windows about them.
     pub(crate) fn begin_with(&mut self, level: &Level, pixels: ArrayView3<'_, u32>) {
         let exemplars = level.windows.len();
-        for ((z, y, x), &pixel) in pixels.indexed_iter() {
-            let Some(&place) = level.place.get(pixel as usize) else {
-                continue;
-            };
-            let voxel = self.index([z, y, x]);
+        let [_, ny, nx] = self.size;
+        for voxel in 0..self.sources.len() {
+            let [z, y, x] = [voxel / (ny * nx), voxel / nx % ny, voxel % nx];
+            let place = pixels
+                .get([z, y, x].map(|i| i * level.step))
+                .and_then(|&pixel| level.place.get(pixel as usize))
+                .filter(|place| **place != NONE);
+            let Some(&place) = place else { continue };
             if self.is_fixed.is_empty() || !self.is_fixed[voxel] {
                 self.sources[voxel] = place;
             }

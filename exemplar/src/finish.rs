@@ -7,10 +7,10 @@ use ndarray::ArrayView3;
 use crate::synthesis::synthesize;
 use crate::{Domain, Exemplar, Method, Solid, SolidError, SolidOptions};
 
-/// Makes a solid that was made in another way more like its exemplars: [`Method::Best`] at full resolution alone, from voxels that show `pixels`
-/// (z, y, x; numbers as [`Solid::sources`], others where nothing is shown) instead of random ones. What is coarser than a neighbourhood stays as it is.
+/// Makes a solid that was made in another way more like its exemplars: [`Method::Best`] from voxels that show `pixels`
+/// (z, y, x; numbers as [`Solid::sources`], others where nothing is shown) instead of random ones. What is coarser than a neighbourhood of the coarsest level stays as it is.
 ///
-/// Method, solver and levels of `options` do not count. Cost as [`synthesize_solid`](crate::synthesize_solid).
+/// Method and solver of `options` do not count. Cost as [`synthesize_solid`](crate::synthesize_solid).
 ///
 /// # Errors
 ///
@@ -48,7 +48,7 @@ pub fn finish_solid(
             what: format!("pixels of {nz} x {ny} x {nx} voxels for a box of {:?}", domain.size()),
         });
     }
-    let mut options = options.clone().with_method(Method::Best).with_levels(1);
+    let mut options = options.clone().with_method(Method::Best);
     options.solver = None;
     synthesize(exemplars, domain, &options, Some(pixels), progress, &mut |_| ())
 }

@@ -93,7 +93,7 @@ pub enum Planes {
 /// How windows are looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Way {
-    /// Some 500 windows by a tree, and those that continue the neighbours' own
+    /// Some 400 windows by a tree, and those that continue the neighbours' own
     Tree,
     /// Every window of IMAGE
     Exact,

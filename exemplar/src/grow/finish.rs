@@ -7,7 +7,7 @@ use ndarray::{Array4, ArrayView3, Axis, Zip};
 use super::{GrowError, Grown};
 use crate::{Domain, Exemplar, FixedVoxel, SolidError, SolidOptions, finish_solid};
 
-/// Removes the seams between the cells of grown stone: `iterations` of [`Method::Best`](crate::Method::Best) at full resolution that begin with what was grown, measured voxels fixed.
+/// Removes the seams between the cells of grown stone: `iterations` of [`Method::Best`](crate::Method::Best) at each of its levels, the coarsest beginning with what was grown, measured voxels fixed.
 ///
 /// `mask`, `exemplar` and `measured` are those of [`grow`](super::grow). Every voxel but the measured ones is again a texel of the exemplar. Slices of constant y, x and z look like the exemplar as it stands: it is for stone without a
 /// direction. Cost: about 3 µs a voxel, iteration and core.

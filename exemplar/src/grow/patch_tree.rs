@@ -21,9 +21,9 @@ pub enum Search {
 }
 
 impl Default for Search {
-    /// 16 leaves: some 500 windows of 60,000.
+    /// 12 leaves: some 400 windows of 60,000.
     fn default() -> Self {
-        Self::Tree { leaves: 16 }
+        Self::Tree { leaves: 12 }
     }
 }
 

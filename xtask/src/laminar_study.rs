@@ -256,7 +256,7 @@ pub fn table(name: &str, picture: &Array2<f32>, size: usize, seeds: u64, costs: 
     }));
     let outcomes = run(picture, &cases)?;
     let mut text = String::new();
-    let number = |v: f64| format!("{v:.3}");
+    let number = |v: f64| if v.is_nan() { "-".to_owned() } else { format!("{v:.3}") };
     for of in outcomes.chunks_exact(seeds as usize) {
         let case = of[0].case;
         let all: Vec<&Outcome> = of.iter().collect();

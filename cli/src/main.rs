@@ -16,6 +16,7 @@ mod profile_table;
 mod progress;
 mod report;
 mod values;
+mod voxel_table;
 mod warnings;
 
 use std::io::{self, Write};

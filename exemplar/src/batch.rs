@@ -1,6 +1,8 @@
 //! All voxels at once: first every neighbourhood looks for its like in the exemplars, then every voxel is chosen from what the
 //! neighbourhoods that cover it say.
 
+use std::ops::ControlFlow;
+
 use rayon::prelude::*;
 
 use crate::field::{Field, Plane, VIEWS, sheet_of};
@@ -18,18 +20,27 @@ const BLOCK: usize = 8;
 type Found = (Vec<u32>, Vec<f32>, f64, usize);
 
 impl Stage<'_> {
-    /// Every neighbourhood's like; the mean energy of a neighbourhood.
+    /// Every neighbourhood's like; the mean energy of a neighbourhood. `go_on` is told how much of the search is done; a break
+    /// ends it.
     ///
     /// With an index histogram, a window that is used too often becomes dearer after each part, one that is used too seldom
     /// cheaper: the prices are the dual variables of the assignment that uses all windows alike, and their steps settle.
-    pub(crate) fn search(&self, field: &mut Field, tallies: &mut Tallies, iteration: usize) -> f64 {
+    pub(crate) fn search(
+        &self,
+        field: &mut Field,
+        tallies: &mut Tallies,
+        iteration: usize,
+        go_on: &dyn Fn(f64) -> ControlFlow<()>,
+    ) -> ControlFlow<(), f64> {
         let (mut energy, mut count) = (0.0, 0_usize);
+        let views = field.matches.len();
         let step = self.recipe.index * self.spread / (1.0 + 0.5 * iteration as f32);
-        for view in 0..field.matches.len() {
+        for view in 0..views {
             let [slices, rows, columns] = field.view_shape(view);
             let area = rows * columns;
             let parts = slices.min(PARTS);
             for part in 0..parts {
+                go_on((view as f64 + part as f64 / parts as f64) / views as f64)?;
                 let prices = self.prices(&tallies.indices[view], &tallies.prices[view]);
                 let mine: Vec<usize> = (part..slices).step_by(parts).collect();
                 let found: Vec<Found> = mine
@@ -55,7 +66,7 @@ impl Stage<'_> {
                 }
             }
         }
-        energy / count.max(1) as f64
+        ControlFlow::Continue(energy / count.max(1) as f64)
     }
 
     /// Price of each place; none without an index histogram.

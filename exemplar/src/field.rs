@@ -1,5 +1,6 @@
 //! The solid while it is made, at one level.
 
+use ndarray::ArrayView3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -92,6 +93,30 @@ impl Field {
             let source = windows[rng.random_range(0..windows.len())];
             if self.is_fixed.is_empty() || !self.is_fixed[voxel] {
                 self.sources[voxel] = source;
+            }
+        }
+        self.show(level);
+    }
+
+    /// After [`Field::begin`]: what these pixels (z, y, x at the finest level) show, where they are any, and the windows about them.
+    pub(crate) fn begin_with(&mut self, level: &Level, pixels: ArrayView3<'_, u32>) {
+        let exemplars = level.windows.len();
+        let [_, ny, nx] = self.size;
+        for voxel in 0..self.sources.len() {
+            let [z, y, x] = [voxel / (ny * nx), voxel / nx % ny, voxel % nx];
+            let place = pixels
+                .get([z, y, x].map(|i| i * level.step))
+                .and_then(|&pixel| level.place.get(pixel as usize))
+                .filter(|place| **place != NONE);
+            let Some(&place) = place else { continue };
+            if self.is_fixed.is_empty() || !self.is_fixed[voxel] {
+                self.sources[voxel] = place;
+            }
+            for view in 0..self.matches.len() {
+                if level.fits(place as usize, sheet_of(view, exemplars)) {
+                    let at = self.in_view(view, [z, y, x]);
+                    self.matches[view][at] = place;
+                }
             }
         }
         self.show(level);

@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use ndarray::{Array3, Array4};
+use ndarray::{Array3, Array4, ArrayView3};
 
 use crate::feature_size::levels_for;
 use crate::field::Field;
+use crate::iteration::Iteration;
 use crate::level::{Atlas, Level, NONE, smoothed};
 use crate::recipe::{Combine, Recipe};
 use crate::stage::Stage;
@@ -82,6 +83,53 @@ pub fn synthesize_solid(
     options: &SolidOptions,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> Result<Solid, SolidError> {
+    synthesize(exemplars, domain, options, None, progress, &mut |_| ())
+}
+
+/// [`synthesize_solid`], which shows `watch` the solid after each iteration of each level.
+///
+/// # Errors
+///
+/// As [`synthesize_solid`].
+///
+/// # Examples
+///
+/// How contrast grows from iteration to iteration (urs-2012, figure 7):
+///
+/// ```
+/// use ndarray::Array2;
+/// use std::ops::ControlFlow;
+/// use stereology_exemplar::{Domain, Exemplar, SolidOptions, synthesize_solid_watched};
+///
+/// let layers = Array2::from_shape_fn((32, 32), |(z, x)| 0.5 + 0.4 * (0.9 * z as f32 + (0.2 * x as f32).sin()).sin());
+/// let mut deviations = Vec::new();
+/// let options = SolidOptions::default().with_iterations(3).with_levels(2);
+/// synthesize_solid_watched(&[Exemplar::grey(layers.view())?], &Domain::new([12; 3])?, &options, &|_| ControlFlow::Continue(()), &mut |now| {
+///     deviations.push((now.coarser_by, now.number, now.values().std(0.0)));
+/// })?;
+/// assert_eq!(deviations.len(), 6);
+/// assert_eq!((deviations[0].0, deviations[5].0, deviations[5].1), (1, 0, 3));
+/// # Ok::<(), stereology_exemplar::SolidError>(())
+/// ```
+pub fn synthesize_solid_watched(
+    exemplars: &[Exemplar],
+    domain: &Domain,
+    options: &SolidOptions,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    watch: &mut dyn FnMut(&Iteration<'_>),
+) -> Result<Solid, SolidError> {
+    synthesize(exemplars, domain, options, None, progress, watch)
+}
+
+/// A solid whose slices look like the exemplars; `begin` are the pixels that its voxels show at first, random ones if `None`.
+pub(crate) fn synthesize(
+    exemplars: &[Exemplar],
+    domain: &Domain,
+    options: &SolidOptions,
+    begin: Option<ArrayView3<'_, u32>>,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    watch: &mut dyn FnMut(&Iteration<'_>),
+) -> Result<Solid, SolidError> {
     check(exemplars, domain, options)?;
     let recipe = Recipe::new(options, exemplars[0].phases().is_some());
     let levels = levels(exemplars, domain, options, &recipe)?;
@@ -101,7 +149,12 @@ pub fn synthesize_solid(
         let level = Level::new(exemplars, &stacks, &atlas, number, window.half, recipe.thinned);
         let mut field = field_at(domain, number, exemplars, &level);
         match before.take() {
-            None => field.begin(&level, views, options.seed),
+            None => {
+                field.begin(&level, views, options.seed);
+                if let Some(pixels) = begin {
+                    field.begin_with(&level, pixels);
+                }
+            }
             Some((coarse, from)) => field.refine(&coarse, &from, &level, &atlas, recipe.combine != Combine::Discrete),
         }
         let stage = Stage::new(
@@ -131,8 +184,13 @@ pub fn synthesize_solid(
             let mut unchanged = false;
             match options.solver() {
                 Solver::Batch => {
-                    energies.push(stage.search(&mut field, &mut tallies, iteration));
-                    cancelled(progress(done + share / 2.0))?;
+                    let go_on = |part: f64| progress(done + part * share * 0.75);
+                    let ControlFlow::Continue(energy) = stage.search(&mut field, &mut tallies, iteration, &go_on)
+                    else {
+                        return Err(SolidError::Cancelled);
+                    };
+                    energies.push(energy);
+                    cancelled(progress(done + share * 0.75))?;
                     stage.vote(&mut field, &mut tallies, recipe.radius(iteration, options.iterations));
                 }
                 Solver::Sequential => {
@@ -146,6 +204,13 @@ pub fn synthesize_solid(
                     }
                 }
             }
+            watch(&Iteration {
+                coarser_by: number,
+                number: iteration + 1,
+                energy: energies.last().copied().unwrap_or_default(),
+                field: &field,
+                colours: exemplars[0].inner_colours(),
+            });
             voxel_iterations += field.voxels() as u64;
             done += share;
             if unchanged {

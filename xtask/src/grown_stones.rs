@@ -9,6 +9,7 @@ use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 use stereology::shape::read_mesh;
 
+use crate::exemplar_solids::timed;
 use crate::texture_table::replace_between;
 
 const MARKS: [&str; 2] = [
@@ -20,34 +21,35 @@ const MARKS: [&str; 2] = [
 pub fn grow(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<()> {
     fs::create_dir_all(results)?;
     let mut text = String::from(
-        "\n| mesh | exemplar | resolution | measured | window | voxels inside | filled | changed | cells | µs a voxel |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        "\n| mesh | exemplar | resolution | measured | window | voxels inside | filled | changed | cells | CPU µs a voxel |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for (mesh, exemplar, resolution, window) in [
         ("spot", "gravel_256", 48, 5),
         ("spot", "gravel_256", 128, 5),
+        ("spot", "binary_carbonate_256", 96, 7),
         ("armadillo", "gravel_256", 96, 5),
+        ("armadillo", "gravel_256", 128, 5),
+        ("armadillo", "gravel_256", 128, 11),
     ] {
         for measured in [0, 40] {
             let path = data.join(format!("meshes/{mesh}.obj"));
             let out = results.join(format!("{mesh}-{exemplar}-{resolution}-{window}-{measured}.npy"));
-            let mut command = Command::new(program);
-            command
-                .arg("grow")
-                .arg(&path)
-                .arg(data.join(format!("exemplars/{exemplar}.png")));
-            command.args(["--resolution", &resolution.to_string(), "--window", &window.to_string()]);
-            command.args(["--json", "--force", "-o"]).arg(&out);
+            let (file, out) = (path.display().to_string(), out.display().to_string());
+            let picture = data.join(format!("exemplars/{exemplar}.png")).display().to_string();
+            let (side, across) = (resolution.to_string(), window.to_string());
+            let csv = results.join(format!("{mesh}-measured.csv")).display().to_string();
+            let mut arguments = vec!["grow", &file, &picture, "--resolution", &side, "--window", &across];
+            arguments.extend(["--json", "--force", "-o", &out]);
             let vertices = read_mesh(&path)?.vertices;
             if let Some(every) = vertices.len().checked_div(measured) {
-                let table = results.join(format!("{mesh}-measured.csv"));
                 let mut rows = String::from("x,y,z,value\n");
                 for (i, v) in vertices.iter().step_by(every.max(1)).take(measured).enumerate() {
                     writeln!(rows, "{},{},{},{}", v.x, v.y, v.z, if i % 2 == 0 { 0 } else { 255 })?;
                 }
-                fs::write(&table, rows)?;
-                command.arg("--measured").arg(&table);
+                fs::write(&csv, rows)?;
+                arguments.extend(["--measured", &csv]);
             }
-            let answer = answer(&mut command)?;
+            let (answer, seconds, _) = timed(program, &arguments)?;
             ensure!(
                 answer["filled"] == answer["voxels_inside"] && answer["fixed_changed"] == 0,
                 "{mesh}: not filled, or a measurement changed: {answer}"
@@ -59,12 +61,79 @@ pub fn grow(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<
                 answer["filled"],
                 answer["fixed_changed"],
                 answer["cells"],
-                answer["microseconds_per_voxel"].as_f64().unwrap_or(f64::NAN)
+                1e6 * seconds / answer["filled"].as_f64().unwrap_or(f64::NAN)
             )?;
         }
     }
+    text.push_str(&finishing(program, data, results)?);
     println!("{text}");
     replace_between(page, MARKS, &text)
+}
+
+/// Blocks of stone with and without a finishing pass: seams, likeness, and measurements that stay.
+fn finishing(program: &Path, data: &Path, results: &Path) -> Result<String> {
+    let mut text = String::from(
+        "\n| block of 64³ | window | finish | steps across seams / inside | SWD 7 (floor) | SWD 16 (floor) | gradient | KL grey | changed | CPU µs a voxel |\n|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    let csv = results.join("block-measured.csv").display().to_string();
+    let mut rows = String::from("x,y,z,value\n");
+    for i in 0..30_u32 {
+        writeln!(
+            rows,
+            "{},{},{},{}",
+            i * 37 % 64,
+            i * 23 % 64,
+            i * 11 % 64,
+            if i % 2 == 0 { 0 } else { 255 }
+        )?;
+    }
+    fs::write(&csv, rows)?;
+    for (exemplar, window) in [("gravel_256", "5"), ("gravel_256", "11"), ("binary_sandstone_256", "5")] {
+        let picture = data.join(format!("exemplars/{exemplar}.png")).display().to_string();
+        for finish in ["0", "10"] {
+            let out = results
+                .join(format!("block-{exemplar}-{window}-{finish}.npy"))
+                .display()
+                .to_string();
+            let arguments = [
+                "grow",
+                "box:1,1,1",
+                &picture,
+                "--resolution",
+                "64",
+                "--window",
+                window,
+                "--measured",
+                &csv,
+                "--measured-in",
+                "voxels",
+                "--finish",
+                finish,
+                "-o",
+                &out,
+                "--force",
+                "--json",
+            ];
+            let (made, seconds, _) = timed(program, &arguments)?;
+            ensure!(made["fixed_changed"] == 0, "{exemplar}: a measurement changed");
+            let (found, ..) = timed(program, &["measure", &picture, &out, "--at-most", "32", "--json"])?;
+            let number = |value: &Value| value.as_f64().map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+            writeln!(
+                text,
+                "| {exemplar} | {window} | {finish} | {} | {} ({}) | {} ({}) | {} | {} | {} | {:.1} |",
+                number(&made["seams"]),
+                number(&found["swd7"]),
+                number(&found["swd7_floor"]),
+                number(&found["swd16"]),
+                number(&found["swd16_floor"]),
+                number(&found["gradient_ratio"]),
+                number(&found["kl_grey"]),
+                made["fixed_changed"],
+                1e6 * seconds / made["filled"].as_f64().unwrap_or(f64::NAN)
+            )?;
+        }
+    }
+    Ok(text)
 }
 
 /// Measures the CT volume of sand: its slices beside one of its own slices, halves beside each other, and the binary of its labels.

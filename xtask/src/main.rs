@@ -2,9 +2,11 @@
 
 mod acceptance;
 mod bench_report;
+mod exemplar_solids;
 mod figures;
 mod grown_stones;
 mod label_scores;
+mod laminar_study;
 mod particle_noise;
 mod relief_table;
 mod renderer_check;
@@ -40,7 +42,7 @@ enum Task {
         /// Where the solids go
         #[arg(long, default_value = "target/acceptance")]
         results: PathBuf,
-        /// Only this part: photographs, textures, noise, reliefs, renderer, grow or measure
+        /// Only this part: photographs, textures, noise, reliefs, renderer, grow, measure, solids or laminar
         #[arg(long)]
         only: Option<String>,
         /// Python that has mitsuba, against which the renderer is held; without it that part is left out
@@ -99,6 +101,13 @@ fn main() -> Result<()> {
             }
             if wanted("measure") {
                 grown_stones::measure(&program, &data, &results, &root()?.join("docs/measure.md"))?;
+            }
+            let page = root()?.join("docs/exemplar.md");
+            if wanted("solids") {
+                exemplar_solids::solids(&program, &data, &results, &page)?;
+            }
+            if wanted("laminar") {
+                exemplar_solids::laminar(&data, &page)?;
             }
             if wanted("reliefs") {
                 let page = root()?.join("docs/microgeometry.md");

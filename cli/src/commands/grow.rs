@@ -8,9 +8,11 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndarray::{Array3, Array4, ArrayView3, Axis};
+use serde_json::{Value, json};
 use stereology::exemplar::grow::{
     self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels,
 };
+use stereology::exemplar::measure::{Seams, seams};
 use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
 use stereology::segment::read_photo;
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
@@ -62,6 +64,9 @@ pub struct Grow {
     /// How windows are looked for
     #[arg(long, value_enum, default_value_t = Way::Tree)]
     pub search: Way,
+    /// Iterations of a finishing pass that removes the seams between cells, as `exemplar --method best` does; measured voxels stay. 0 is none; 10 are plenty
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = finish)]
+    pub finish: usize,
     /// For picture:H,W: that many levels from coarse to fine, row by row (Wei and Levoy), instead of growing
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
@@ -108,6 +113,14 @@ fn seeds(text: &str) -> Result<usize, String> {
     }
 }
 
+/// 0 to a thousand.
+fn finish(text: &str) -> Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(number @ 0..=1000) => Ok(number),
+        _ => Err("a whole number from 0 to 1000 is needed".to_owned()),
+    }
+}
+
 impl Grow {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         if let Some(size) = self.mesh.strip_prefix("picture:") {
@@ -149,15 +162,19 @@ impl Grow {
         };
         let options = self.options(everywhere.seed, if measured.is_empty() { 12 } else { 0 });
         let step = Step::begin("grow", everywhere.quiet);
-        let grown = grow::grow(
-            voxels.inside.view(),
-            image.samples.view(),
-            &measured,
-            &options,
-            &|done| step.at(done),
-        )
-        .map_err(|error| self.explained(&error))?;
+        let (inside, samples) = (voxels.inside.view(), image.samples.view());
+        let mut grown = grow::grow(inside, samples, &measured, &options, &|done| step.at(done))
+            .map_err(|error| self.explained(&error))?;
         drop(step);
+        let seams_grown = seams(grown.values.view(), grown.labels.view());
+        if self.finish > 0 {
+            let step = Step::begin("finish", everywhere.quiet);
+            let (iterations, seed) = (self.finish, everywhere.seed);
+            grown = grow::finish(&grown, inside, samples, &measured, iterations, seed, &|done| {
+                step.at(done)
+            })
+            .map_err(|error| self.explained(&error))?;
+        }
         go_on()?;
         let spacing = [voxels.spacing; 3];
         if image.is_bytes {
@@ -170,6 +187,14 @@ impl Grow {
                 let format = Format::from_path(path).or_usage("FILE")?;
                 write(path, format, spacing, &numbers.clone().insert_axis(Axis(3)))?;
             }
+        }
+        let found = seams(grown.values.view(), grown.labels.view());
+        let told = |seams: Seams| seams.visibility().map_or(Value::Null, |v| json!(v));
+        answer.field("seams", told(found));
+        if self.finish > 0 {
+            answer
+                .field("finish", self.finish)
+                .field("seams_before_finish", told(seams_grown));
         }
         self.tell(&mut answer, &grown, &voxels, begin.elapsed().as_secs_f64());
         Ok(answer)
@@ -262,10 +287,11 @@ impl Grow {
             self.resolution.is_some(),
             self.cells.is_some(),
             self.sources.is_some(),
+            self.finish > 0,
         ];
         if !is_png || only_solids.contains(&true) {
             return Err(Failure::usage(
-                "picture:H,W is written to -o FILE.png, and takes no --resolution, --measured, --cells or --sources",
+                "picture:H,W is written to -o FILE.png, and takes no --resolution, --measured, --cells, --sources or --finish",
             ));
         }
         check_file(&self.output, everywhere.force)?;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use image::{Rgb, RgbImage};
-use ndarray::{Array4, ArrayView3, Axis, Ix3};
+use ndarray::{Array3, Array4, ArrayView3, Axis, Ix3};
 use serde_json::{Value, json};
 use stereology::exemplar::measure::{
-    BandPass, Comparison, Family, FamilyError, Figure, MeasureOptions, compare, copying, sections,
+    BandPass, Comparison, Family, FamilyError, Figure, MeasureOptions, compare, copying, sections, sections_inside,
 };
 use stereology::grid::{SampleType, read_npy, read_volume};
 use stereology::segment::read_photo;
@@ -54,6 +54,9 @@ pub struct Measure {
     /// Which texel each voxel was copied from (.npy of u32: row x width + column): tells coverage and copying too
     #[arg(long, value_name = "NPY")]
     pub sources: Option<PathBuf>,
+    /// Volume of the same size (.npy, .nrrd, .tif), not 0 inside, such as `grow --cells`: of each slice the largest rectangle inside is measured
+    #[arg(long, value_name = "FILE")]
+    pub mask: Option<PathBuf>,
     /// A page with all curves and pictures
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -78,6 +81,9 @@ impl std::str::FromStr for Families {
     }
 }
 
+/// Pixels that a slice needs inside the mask, each way.
+const LEAST_INSIDE: usize = 16;
+
 /// A picture or volume with values 0 to 1.
 struct Samples {
     values: Array4<f32>,
@@ -101,11 +107,18 @@ impl Measure {
         for warning in [exemplar.guessed, volume.guessed].into_iter().flatten() {
             answer.warn(warning);
         }
-        let (slices, left_out) = self.of(&volume.values);
+        let mask = self.inside(&volume.values)?;
+        let (slices, left_out) = self.of(&volume.values, mask.as_ref());
+        if slices.is_empty() {
+            return Err(Failure::run(format!(
+                "{}: no slice has a square of {LEAST_INSIDE} pixels inside the mask",
+                self.volume.display()
+            )));
+        }
         let pictures = if exemplar.values.dim().0 == 1 {
             vec![exemplar.values.index_axis(Axis(0), 0)]
         } else {
-            self.of(&exemplar.values).0
+            self.of(&exemplar.values, None).0
         };
         if left_out > 0 {
             answer.warn(Warning::new(
@@ -146,13 +159,33 @@ impl Measure {
         Ok(answer)
     }
 
+    /// Which voxels of the volume count; all if `None`.
+    fn inside(&self, volume: &Array4<f32>) -> Result<Option<Array3<bool>>, Failure> {
+        let Some(path) = &self.mask else { return Ok(None) };
+        let samples = read_volume(path).at(path)?.samples;
+        let mask = samples.map_axis(Axis(3), |channels| channels.iter().any(|v| *v != 0.0));
+        let (nz, ny, nx, _) = volume.dim();
+        if mask.dim() != (nz, ny, nx) {
+            return Err(Failure::run(format!(
+                "{}: a mask of {:?} voxels for a volume of {nz} x {ny} x {nx}",
+                path.display(),
+                mask.dim()
+            )));
+        }
+        Ok(Some(mask))
+    }
+
     /// The slices that are measured, and how many are left out.
-    fn of<'a>(&self, volume: &'a Array4<f32>) -> (Vec<ArrayView3<'a, f32>>, usize) {
+    fn of<'a>(&self, volume: &'a Array4<f32>, mask: Option<&Array3<bool>>) -> (Vec<ArrayView3<'a, f32>>, usize) {
         let (mut taken, mut all) = (Vec::new(), 0);
         for &family in &self.slices.0 {
-            let of = sections(volume.view(), family);
+            let whole = sections(volume.view(), family);
+            all += whole.len();
+            let of = match mask {
+                Some(mask) => sections_inside(volume.view(), mask.view(), family, LEAST_INSIDE),
+                None => whole,
+            };
             let n = of.len();
-            all += n;
             let most = self.at_most.min(n);
             taken.extend((0..most).map(|i| of[(2 * i + 1) * n / (2 * most)]));
         }

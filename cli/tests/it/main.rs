@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod contract;
+mod exemplars;
 mod packings;
 mod reliefs;
 mod small_commands;

@@ -70,6 +70,47 @@ fn a_block_is_filled_around_its_measurements() {
     assert!(judged["coverage"].as_f64().unwrap() > 0.05 && judged["longest_copy"].as_u64().unwrap() > 0);
 }
 
+/// Stone in a ball is measured inside it, and finished where it is asked.
+#[test]
+fn masks_and_finishing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&folder, name);
+    write_texture(&at("stone.png"));
+    let arguments = [
+        "grow",
+        "sphere",
+        &at("stone.png"),
+        "--resolution",
+        "26",
+        "--seeds",
+        "6",
+        "--finish",
+        "2",
+    ];
+    let grown = answer(&[&arguments[..], &["-o", &at("a.npy"), "--cells", &at("cells.npy")]].concat());
+    assert!(grown["seams"].as_f64().unwrap() > 0.0 && grown["seams_before_finish"].as_f64().unwrap() > 0.0);
+    assert_eq!(
+        (&grown["finish"], &grown["filled"]),
+        (&2.into(), &grown["voxels_inside"])
+    );
+    let measured = |more: &[&str]| answer(&[&["measure", &at("stone.png"), &at("a.npy")], more].concat());
+    let (inside, all) = (measured(&["--mask", &at("cells.npy")]), measured(&[]));
+    // The black corners of the box are no stone.
+    assert!(
+        inside["kl_grey"].as_f64().unwrap() < 0.5 * all["kl_grey"].as_f64().unwrap(),
+        "{inside} {all}"
+    );
+    assert!(
+        inside["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|w| w["code"] == "slices-left-out")
+    );
+    let (code, _, error) = stereology(&["measure", &at("stone.png"), &at("a.npy"), "--mask", &at("stone.png")]);
+    assert!(code == 1 && error.contains("stone.png"), "{error}");
+}
+
 #[test]
 fn measurements_may_be_numbered_by_voxel_or_lie_on_the_surface() {
     let folder = tempfile::tempdir().unwrap();

@@ -104,6 +104,9 @@ pub enum GrowError {
         /// Most levels possible.
         most: usize,
     },
+    /// The finishing pass cannot be made.
+    #[error("the stone cannot be finished: {0}")]
+    Finish(crate::SolidError),
     /// The callback broke off.
     #[error("cancelled")]
     Cancelled,

@@ -20,6 +20,15 @@ pub enum Family {
 impl Family {
     /// All three.
     pub const ALL: [Self; 3] = [Self::Xz, Self::Yz, Self::Xy];
+
+    /// The axis of a volume (z, y, x) that the planes are normal to.
+    pub(super) fn normal(self) -> Axis {
+        match self {
+            Self::Xz => Axis(1),
+            Self::Yz => Axis(2),
+            Self::Xy => Axis(0),
+        }
+    }
 }
 
 impl Display for Family {
@@ -66,11 +75,7 @@ impl FromStr for Family {
 /// ```
 #[must_use]
 pub fn sections(volume: ArrayView4<'_, f32>, family: Family) -> Vec<ArrayView3<'_, f32>> {
-    let normal = match family {
-        Family::Xz => Axis(1),
-        Family::Yz => Axis(2),
-        Family::Xy => Axis(0),
-    };
+    let normal = family.normal();
     (0..volume.len_of(normal))
         .map(|at| volume.index_axis_move(normal, at))
         .collect()

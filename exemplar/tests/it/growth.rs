@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
 use stereology_exemplar::grow::{
-    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, grow, grow_picture, synthesize_by_levels,
+    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, finish, grow, grow_picture,
+    synthesize_by_levels,
 };
 use stereology_exemplar::measure::seams;
 use stereology_shape::{ClosedMesh, TriangleMesh};
@@ -158,6 +159,40 @@ fn windows_make_texture() {
     assert!(textured.inside < 0.7 * noise.inside, "{textured:?} {noise:?}");
     assert!((noise.visibility().unwrap() - 1.0).abs() < 0.1);
     assert!(textured.visibility().unwrap() > 1.0);
+}
+
+/// A finishing pass removes the seams of cells; measurements and what lies outside the mask stay, and all else is still the exemplar's.
+#[test]
+fn finishing_removes_seams() {
+    let mask = Array3::from_shape_fn((24, 24, 24), |(z, y, x)| z + y + x < 60);
+    let measured: Vec<_> = (0..8)
+        .map(|i| ([2 + i, 20 - 2 * i, (7 * i) % 20], vec![(31 * i) as f32 + 0.5]))
+        .collect();
+    let made = grown(&mask, &measured, &GrowOptions::default().with_window(3));
+    let finished = finish(&made, mask.view(), stone(64).view(), &measured, 5, 0, &go).unwrap();
+    let visible = |made: &Grown| seams(made.values.view(), made.labels.view()).visibility().unwrap();
+    let (before, after) = (visible(&made), visible(&finished));
+    assert!(
+        before > 1.3 && (after - 1.0).abs() < 0.4 * (before - 1.0),
+        "{before} {after}"
+    );
+    assert_eq!((finished.fixed_changed, &finished.labels), (0, &made.labels));
+    for ((z, y, x), inside) in mask.indexed_iter() {
+        let value = finished.values[[z, y, x, 0]];
+        let given = measured.iter().find(|(at, _)| *at == [z, y, x]);
+        let right = match (inside, given) {
+            (false, _) => value == 0.0,
+            (true, Some((_, v))) => value == v[0],
+            (true, None) => [20.0, 120.0, 220.0].contains(&value),
+        };
+        assert!(right, "{z} {y} {x}: {value}");
+    }
+    let tiny = Array3::from_shape_fn((7, 7, 1), |(y, x, _)| (y * x) as f32);
+    let stopped = finish(&made, mask.view(), tiny.view(), &[], 1, 0, &go);
+    assert!(
+        matches!(stopped, Err(GrowError::ExemplarTooSmall { window: 7, .. })),
+        "{stopped:?}"
+    );
 }
 
 /// Several channels (chemistry) go together: a voxel's channels are those of one texel.

@@ -207,7 +207,7 @@ fn best_keeps_the_histogram_and_averaging_does_not() {
 #[test]
 fn coherence_comes_near_exact_search() {
     let exemplar = [Exemplar::grey(layers(40).view()).unwrap()];
-    let domain = Domain::new([16; 3]).unwrap();
+    let domain = Domain::new([13; 3]).unwrap();
     let energy = |search| {
         let of = |seed| {
             let options = SolidOptions::default()

@@ -269,7 +269,7 @@ fn larger(picture: &RgbImage, factor: u32) -> RgbImage {
 }
 
 /// Pictures side by side, their tops at one height.
-fn row(pictures: &[RgbImage]) -> RgbImage {
+pub fn row(pictures: &[RgbImage]) -> RgbImage {
     let height = pictures.iter().map(RgbImage::height).max().unwrap_or(1);
     let width: u32 = pictures.iter().map(|p| p.width() + 8).sum();
     let mut all = RgbImage::from_pixel(width.saturating_sub(8).max(1), height, Rgb([255; 3]));
@@ -282,7 +282,7 @@ fn row(pictures: &[RgbImage]) -> RgbImage {
 }
 
 /// Pictures one above the other.
-fn column(pictures: &[RgbImage]) -> RgbImage {
+pub fn column(pictures: &[RgbImage]) -> RgbImage {
     let width = pictures.iter().map(RgbImage::width).max().unwrap_or(1);
     let height: u32 = pictures.iter().map(|p| p.height() + 8).sum();
     let mut all = RgbImage::from_pixel(width, height.saturating_sub(8).max(1), Rgb([255; 3]));

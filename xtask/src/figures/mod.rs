@@ -7,6 +7,8 @@ mod density_recovery;
 mod estimators;
 mod grain_size_tools;
 mod growing;
+pub mod laminar;
+mod lines;
 mod materials;
 mod packings;
 mod particles;
@@ -25,7 +27,7 @@ use anyhow::Result;
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
-    let figures: [(&str, Figure); 21] = [
+    let figures: [(&str, Figure); 24] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
         ("figure-03-slices", particles::draw_slices),
         ("figure-03-residual", particles::draw_residuals),
@@ -45,6 +47,9 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("packing", packings::draw),
         ("texture", textures::draw),
         ("grow", growing::draw),
+        ("laminar-main", laminar::draw),
+        ("laminar-parameters", laminar::draw_parameters),
+        ("laminar-table", laminar::draw_table),
         ("microgeometry", reliefs::draw),
         ("readme", solids::draw_readme),
     ];

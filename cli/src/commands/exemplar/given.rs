@@ -10,64 +10,31 @@ use stereology::grid::read_volume;
 use crate::answer::Answer;
 use crate::commands::grow::closed_mesh;
 use crate::failure::{Explain, Failure};
+use crate::voxel_table::{self, Row};
 use crate::warnings::Warning;
 
-/// Voxels from rows of x, y, z and `channels` values, which are divided by `scale`. A header is optional; its columns may stand
-/// in any order.
+/// Voxels from rows of x, y, z and `channels` values of 0 to 255, which are divided by `scale`.
 pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel>, Failure> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .at(path)?;
-    let names: &[&str] = if channels == 3 {
-        &["x", "y", "z", "r", "g", "b"]
-    } else {
-        &["x", "y", "z", "value"]
-    };
-    let wrong = |line: u64, what: &str| {
-        Failure::run(format!(
-            "{}, line {line}: {what}; a row is {}, with whole numbers of voxels from 0 and values from 0 to 255",
-            path.display(),
-            names.join(", ")
-        ))
-    };
-    let mut columns: Vec<usize> = (0..3 + channels).collect();
-    let mut found = Vec::new();
-    for (number, record) in reader.records().enumerate() {
-        let record = record.at(path)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        if number == 0 && record.iter().all(|field| field.parse::<f64>().is_err()) {
-            let named: Option<Vec<usize>> = names
-                .iter()
-                .map(|name| record.iter().position(|field| field.eq_ignore_ascii_case(name)))
-                .collect();
-            columns = named.ok_or_else(|| wrong(line, "the header does not name these columns"))?;
-            continue;
-        }
-        let numbers: Option<Vec<f64>> = columns
+    let voxel = |row: Row| {
+        let [x, y, z] = row.place;
+        if row
+            .place
             .iter()
-            .map(|&column| record.get(column).and_then(|field| field.parse().ok()))
-            .collect();
-        let numbers = numbers.ok_or_else(|| wrong(line, "not enough numbers"))?;
-        let (place, values) = numbers.split_at(3);
-        if place.iter().any(|v| v.fract() != 0.0 || !(0.0..65_536.0).contains(v)) {
-            return Err(wrong(line, "x, y, z are no voxel"));
+            .any(|v| v.fract() != 0.0 || !(0.0..65_536.0).contains(v))
+        {
+            return Err(Failure::run(format!(
+                "{}, line {}: ({x}, {y}, {z}) is no voxel; x, y, z are whole numbers from 0",
+                path.display(),
+                row.line
+            )));
         }
-        if values.iter().any(|v| v.fract() != 0.0 || !(0.0..=255.0).contains(v)) {
-            return Err(wrong(line, "the value is none of a picture"));
-        }
-        found.push((
-            [place[2] as usize, place[1] as usize, place[0] as usize],
-            values.iter().map(|&v| v as f32 / scale).collect(),
-        ));
-    }
-    if found.is_empty() {
-        return Err(Failure::run(format!("{}: holds no voxel", path.display())));
-    }
-    Ok(found)
+        let values = row.values.into_iter().map(|v| v / scale).collect();
+        Ok(([z as usize, y as usize, x as usize], values))
+    };
+    voxel_table::read(path, channels, true)?
+        .into_iter()
+        .map(voxel)
+        .collect()
 }
 
 /// The mask: an array of the solid's size, or a mesh as large as fits into it, in its middle.

@@ -6,7 +6,8 @@ use clap::ValueEnum;
 use nalgebra::Point3;
 use stereology::exemplar::grow::Voxels;
 
-use crate::failure::{Explain, Failure};
+use crate::failure::Failure;
+use crate::voxel_table::{self, Row};
 use crate::warnings::Warning;
 
 /// What x, y, z are.
@@ -31,7 +32,7 @@ const REACH: f64 = 1.75;
 
 /// Reads rows of x, y, z and a value for each of `channels`; `bytes` asks for whole numbers from 0 to 255.
 pub fn read(path: &Path, unit: Unit, voxels: &Voxels, channels: usize, bytes: bool) -> Result<Measurements, Failure> {
-    let rows = rows(path, channels, bytes)?;
+    let rows = voxel_table::read(path, channels, bytes)?;
     let in_mesh = || in_mesh(path, &rows, voxels);
     let found = match unit {
         Unit::Mesh => in_mesh()?,
@@ -49,76 +50,6 @@ pub fn read(path: &Path, unit: Unit, voxels: &Voxels, channels: usize, bytes: bo
         },
     };
     Ok(found)
-}
-
-/// A row: its line, place and values.
-struct Row {
-    line: u64,
-    place: [f64; 3],
-    values: Vec<f32>,
-}
-
-fn rows(path: &Path, channels: usize, bytes: bool) -> Result<Vec<Row>, Failure> {
-    let place = path.display();
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .at(path)?;
-    let (mut rows, mut columns) = (Vec::new(), None);
-    for record in reader.records() {
-        let record = record.at(path)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let numbers: Option<Vec<f64>> = record.iter().map(|field| field.parse().ok()).collect();
-        let Some(numbers) = numbers.filter(|n| n.iter().all(|v| v.is_finite())) else {
-            if columns.is_none() && rows.is_empty() {
-                columns = Some(named(&record).ok_or_else(|| {
-                    Failure::run(format!(
-                        "{place}: its header names no columns x, y, z; name them, or leave the header out"
-                    ))
-                })?);
-                continue;
-            }
-            return Err(Failure::run(format!(
-                "{place}, line {line}: not a row of finite numbers"
-            )));
-        };
-        if numbers.len() != 3 + channels {
-            return Err(Failure::run(format!(
-                "{place}, line {line}: {} numbers; x, y, z and {channels} value(s) are needed, one a channel of the picture",
-                numbers.len()
-            )));
-        }
-        let [x, y, z] = columns.unwrap_or([0, 1, 2]);
-        let values = numbers
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| ![x, y, z].contains(i))
-            .map(|(_, v)| *v);
-        let values: Vec<f64> = values.collect();
-        if bytes && values.iter().any(|v| v.fract() != 0.0 || !(0.0..=255.0).contains(v)) {
-            return Err(Failure::run(format!(
-                "{place}, line {line}: values {values:?}; those of a picture are whole numbers from 0 to 255"
-            )));
-        }
-        rows.push(Row {
-            line,
-            place: [numbers[x], numbers[y], numbers[z]],
-            values: values.into_iter().map(|v| v as f32).collect(),
-        });
-    }
-    if rows.is_empty() {
-        return Err(Failure::run(format!("{place}: holds no measurement")));
-    }
-    Ok(rows)
-}
-
-/// Columns of x, y, z in a header.
-fn named(header: &csv::StringRecord) -> Option<[usize; 3]> {
-    let column = |name: &str| header.iter().position(|field| field.eq_ignore_ascii_case(name));
-    Some([column("x")?, column("y")?, column("z")?])
 }
 
 fn in_mesh(path: &Path, rows: &[Row], voxels: &Voxels) -> Result<Measurements, Failure> {

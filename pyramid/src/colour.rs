@@ -1,6 +1,6 @@
-//! Colours as independent numbers: the principal axes of an exemplar's colours.
+//! Colours as independent numbers: the principal axes of an exemplar's colours, or of what brightness leaves of them.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Mean and principal axes of a set of colours (any number of channels).
 ///
@@ -27,8 +27,10 @@ use nalgebra::{DMatrix, SymmetricEigen};
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipalColours {
     mean: Vec<f64>,
-    /// Rows: axes by falling variance.
+    /// Rows: the weights of the channels in each component.
     axes: DMatrix<f64>,
+    /// Columns: the colour that each component adds; the inverse of `axes`.
+    colours: DMatrix<f64>,
     variances: Vec<f64>,
 }
 
@@ -57,15 +59,75 @@ impl PrincipalColours {
         }
         covariance /= f64::max(n, 1.0);
         covariance.fill_upper_triangle_with_lower_triangle();
-        let eigen = SymmetricEigen::new(covariance);
-        let mut order: Vec<usize> = (0..channels).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]).then(a.cmp(&b)));
-        let axes = DMatrix::from_fn(channels, channels, |row, channel| {
-            let axis = eigen.eigenvectors.column(order[row]);
-            axis[channel] * if axis.sum() < 0.0 { -1.0 } else { 1.0 }
-        });
-        let variances = order.iter().map(|&i| eigen.eigenvalues[i].max(0.0)).collect();
-        Self { mean, axes, variances }
+        let (axes, variances) = principal_axes(covariance);
+        Self {
+            mean,
+            colours: axes.transpose(),
+            axes,
+            variances,
+        }
+    }
+
+    /// The same colours with a weighted sum of the channels, such as their brightness, as the first component; then, by falling
+    /// variance, the principal axes of what it does not tell of the colours (their regression on it taken away). The components
+    /// are uncorrelated still.
+    ///
+    /// Components that are uncorrelated as a whole need not be so in every band of frequencies. What is made of them apart so has
+    /// the statistics of each, and not those of their sums: brightness, to which eyes are most sensitive, is better one of them.
+    ///
+    /// # Panics
+    ///
+    /// If there are not as many weights as channels, or all are zero.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use stereology_pyramid::PrincipalColours;
+    ///
+    /// let colours = [[1.0_f32, 0.1, 0.0], [0.0, 0.9, 0.0], [0.2, 0.0, 0.5], [0.6, 0.7, 0.4]];
+    /// let axes = PrincipalColours::fit(3, colours.iter().map(|c| c.as_slice())).led_by(&[1.0, 1.0, 1.0]);
+    /// let mut component = [0.0; 3];
+    /// axes.decorrelate(&colours[0], &mut component);
+    /// let brightness: f64 = colours[0].iter().zip(axes.mean()).map(|(&v, m)| f64::from(v) - m).sum();
+    /// assert!((f64::from(component[0]) - brightness / 3.0_f64.sqrt()).abs() < 1e-6);
+    /// let mut back = [0.0; 3];
+    /// axes.recombine(&component, &mut back);
+    /// assert!(back.iter().zip(&colours[0]).all(|(a, b)| (a - b).abs() < 1e-6));
+    /// ```
+    #[must_use]
+    pub fn led_by(self, weights: &[f64]) -> Self {
+        let n = self.mean.len();
+        assert_eq!(weights.len(), n, "a weight for every channel");
+        let first = DVector::from_column_slice(weights).normalize();
+        assert!(first.iter().all(|v| v.is_finite()), "weights that are not all zero");
+        let covariance =
+            &self.colours * DMatrix::from_diagonal(&DVector::from_column_slice(&self.variances)) * &self.axes;
+        let variance = first.dot(&(&covariance * &first));
+        let all = covariance.trace();
+        // What the colours are on average where the sum is one more.
+        let slope = if variance > 1e-9 * all {
+            &covariance * &first / variance
+        } else {
+            first.clone()
+        };
+        let left = covariance - variance * &slope * slope.transpose();
+        // Made the first axis, so that the others are at right angles to it.
+        let (basis, variances) = principal_axes(left + 2.0 * all.max(f64::MIN_POSITIVE) * &first * first.transpose());
+        let mut axes = basis.clone();
+        let mut colours = basis.transpose();
+        axes.set_row(0, &first.transpose());
+        colours.set_column(0, &slope);
+        for row in 1..n {
+            let along = basis.row(row).dot(&slope.transpose());
+            axes.set_row(row, &(basis.row(row) - along * first.transpose()));
+        }
+        let variances = std::iter::once(variance * slope.norm_squared()).chain(variances.into_iter().skip(1));
+        Self {
+            mean: self.mean,
+            axes,
+            colours,
+            variances: variances.collect(),
+        }
     }
 
     /// Mean colour.
@@ -74,7 +136,7 @@ impl PrincipalColours {
         &self.mean
     }
 
-    /// Variance along each axis, falling.
+    /// Variance of the colours that goes with each component; falling, but for a first one that was chosen.
     #[must_use]
     pub fn variances(&self) -> &[f64] {
         &self.variances
@@ -98,8 +160,22 @@ impl PrincipalColours {
             let along = components
                 .iter()
                 .enumerate()
-                .map(|(row, &v)| self.axes[(row, c)] * f64::from(v));
+                .map(|(row, &v)| self.colours[(c, row)] * f64::from(v));
             *value = (self.mean[c] + along.sum::<f64>()) as f32;
         }
     }
+}
+
+/// Axes (rows) by falling variance, each pointing to where its channels sum to more, and the variances.
+fn principal_axes(covariance: DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+    let channels = covariance.nrows();
+    let eigen = SymmetricEigen::new(covariance);
+    let mut order: Vec<usize> = (0..channels).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]).then(a.cmp(&b)));
+    let axes = DMatrix::from_fn(channels, channels, |row, channel| {
+        let axis = eigen.eigenvectors.column(order[row]);
+        axis[channel] * if axis.sum() < 0.0 { -1.0 } else { 1.0 }
+    });
+    let variances = order.iter().map(|&i| eigen.eigenvalues[i].max(0.0)).collect();
+    (axes, variances)
 }

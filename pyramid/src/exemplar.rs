@@ -17,6 +17,8 @@ const QUANTILES: usize = 1 << 16;
 const SAMPLES: usize = 1 << 22;
 /// Radial bins of the slice spectrum up to Nyquist.
 const RADIAL_BINS: usize = 32;
+/// Shares of red, green and blue in brightness (Rec. 601, of encoded values).
+const BRIGHTNESS: [f64; 3] = [0.299, 0.587, 0.114];
 /// Farthest lag of the covariance under a mask, in pixels.
 const REACH: usize = 64;
 
@@ -110,7 +112,10 @@ impl Prepared {
                 })
             })
             .collect();
-        let colours = PrincipalColours::fit(channels, pooled.chunks_exact(channels));
+        let mut colours = PrincipalColours::fit(channels, pooled.chunks_exact(channels));
+        if channels == BRIGHTNESS.len() {
+            colours = colours.led_by(&BRIGHTNESS);
+        }
         let views = planes_of
             .iter()
             .zip(masks)
@@ -140,16 +145,15 @@ impl Prepared {
         self.channels.len()
     }
 
-    /// Whether a component varies enough to have a texture.
     /// Share of the variance that a component has.
     pub(crate) fn share(&self, component: usize) -> f64 {
         let variances = self.colours.variances();
         variances[component] / variances.iter().sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
+    /// Whether a component varies enough to have a texture.
     pub(crate) fn varies(&self, component: usize) -> bool {
-        let variances = self.colours.variances();
-        variances[component] > 1e-12 && variances[component] > 1e-9 * variances[0]
+        self.colours.variances()[component] > 1e-12 && self.share(component) > 1e-9
     }
 
     /// Spectrum that the slices of a volume should have in one component: the mean over the exemplars.

@@ -18,12 +18,12 @@ use crate::{Cut, Mode, TextureError, TextureOptions, TextureReport};
 /// some slices of a coarse texture have half of the contrast of others, 1 makes them all alike.
 const EVENNESS: f64 = 0.5;
 /// A colour component with a smaller share of the variance has its bands matched on slices only, not on oblique planes.
-const PRINCIPAL: f64 = 0.02;
+const PRINCIPAL: f64 = 0.25;
 
 /// What all rounds need to know.
 pub(crate) struct Rounds<'a> {
     pub(crate) size: [usize; 3],
-    /// Colour components that vary, by falling variance, and the share of the variance that each has.
+    /// Colour components that vary, brightness first, and the share of the variance that each has.
     pub(crate) varying: &'a [usize],
     pub(crate) shares: Vec<f64>,
     /// By axis (z, y, x) and component that varies.
@@ -60,7 +60,8 @@ impl Rounds<'_> {
 
     /// Colour components, of those that vary, that oblique planes are matched for.
     fn principal(&self) -> usize {
-        self.shares.iter().take_while(|&&share| share >= PRINCIPAL).count()
+        let many = self.shares.iter().skip(1).take_while(|&&share| share >= PRINCIPAL);
+        self.shares.len().min(1 + many.count())
     }
 
     /// Passes over components, of all rounds.

@@ -5,6 +5,7 @@
     reason = "tests make small numbers and compare exact ones"
 )]
 
+mod colours;
 mod matching;
 mod pyramid;
 mod space;

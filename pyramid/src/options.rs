@@ -273,8 +273,8 @@ pub struct TextureReport {
     /// colour components of ln(variance / target variance).
     pub band_errors: Vec<f64>,
     /// After each round, how far the bands of cuts are from the exemplar's, in every mode: root mean square of ln(variance /
-    /// exemplar's) over bands (orientations of a level together), colour components of a fiftieth of the variance or more (by
-    /// their share), and planes normal to axes, face and space diagonals (axes only in [`Mode::Oriented`]). Empty for images.
+    /// exemplar's) over bands (orientations of a level together) of the brightness, and planes normal to axes, face and space
+    /// diagonals (axes only in [`Mode::Oriented`]). Empty for images.
     pub slice_errors: Vec<f64>,
     /// The same of the finished volume; zero for images.
     pub final_error: f64,

@@ -17,15 +17,12 @@ use crate::{Cut, Mode, TextureError, TextureOptions, TextureReport};
 /// How much nearer each slice's band powers are brought to the mean over the slices before matching, as an exponent: 0 lets
 /// some slices of a coarse texture have half of the contrast of others, 1 makes them all alike.
 const EVENNESS: f64 = 0.5;
-/// A colour component with a smaller share of the variance has its bands matched on slices only, not on oblique planes.
-const PRINCIPAL: f64 = 0.25;
 
 /// What all rounds need to know.
 pub(crate) struct Rounds<'a> {
     pub(crate) size: [usize; 3],
-    /// Colour components that vary, brightness first, and the share of the variance that each has.
+    /// Colour components that vary, brightness first: it alone has its bands matched on oblique planes too.
     pub(crate) varying: &'a [usize],
-    pub(crate) shares: Vec<f64>,
     /// By axis (z, y, x) and component that varies.
     pub(crate) targets: [&'a [BandTargets]; 3],
     pub(crate) options: &'a TextureOptions,
@@ -58,19 +55,13 @@ impl Rounds<'_> {
         }
     }
 
-    /// Colour components, of those that vary, that oblique planes are matched for.
-    fn principal(&self) -> usize {
-        let many = self.shares.iter().skip(1).take_while(|&&share| share >= PRINCIPAL);
-        self.shares.len().min(1 + many.count())
-    }
-
     /// Passes over components, of all rounds.
     fn passes(&self) -> usize {
         let slices = matches!(self.options.mode, Mode::Slices | Mode::Oriented);
         let of = |planes: &Planes| match planes {
             Planes::Axes => 3 * self.varying.len(),
-            Planes::FaceDiagonals => 6 * self.principal(),
-            Planes::SpaceDiagonals => 4 * self.principal(),
+            Planes::FaceDiagonals => 6,
+            Planes::SpaceDiagonals => 4,
         };
         if slices {
             let rounds = 0..self.options.iterations;
@@ -133,32 +124,28 @@ impl Convergence {
         }
     }
 
-    /// Root mean square over cuts, principal components (each by its share of the variance) and bands of ln(variance /
-    /// exemplar's).
+    /// Root mean square over cuts and bands, in the first component, of ln(variance / exemplar's).
     fn error(&mut self, canvas: &Canvas<'_>, rounds: &Rounds<'_>) -> f64 {
-        let (mut sum, mut weights) = (0.0, 0.0);
-        let components = rounds.varying.iter().zip(&rounds.shares);
-        for (i, (&c, share)) in components.enumerate().take(rounds.principal()) {
-            let found = self.cuts.variances(&canvas.components[c], &self.normals);
-            for (n, found) in found.iter().enumerate() {
-                let wanted = &self.wanted[if n < 3 { n } else { 0 }][i];
-                for (f, w) in found[..found.len() - 1]
-                    .iter()
-                    .zip(wanted)
-                    .filter(|(f, w)| **f > 0.0 && **w > 0.0)
-                {
-                    sum += share * (f / w).ln().powi(2);
-                    weights += share;
-                }
+        let Some(&first) = rounds.varying.first() else {
+            return 0.0;
+        };
+        let (mut sum, mut count) = (0.0, 0.0);
+        let found = self.cuts.variances(&canvas.components[first], &self.normals);
+        for (n, found) in found.iter().enumerate() {
+            let wanted = &self.wanted[if n < 3 { n } else { 0 }][0];
+            let bands = found[..found.len() - 1].iter().zip(wanted);
+            for (f, w) in bands.filter(|(f, w)| **f > 0.0 && **w > 0.0) {
+                sum += (f / w).ln().powi(2);
+                count += 1.0;
             }
         }
-        if weights > 0.0 { (sum / weights).sqrt() } else { 0.0 }
+        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 
-    /// Gives the cuts of all directions the band variances wanted on the first axis, for the first `count` components.
-    fn reweight(&mut self, canvas: &mut Canvas<'_>, rounds: &Rounds<'_>, count: usize) {
+    /// Gives the cuts of all directions the band variances wanted on the first axis.
+    fn reweight(&mut self, canvas: &mut Canvas<'_>, rounds: &Rounds<'_>) {
         let wanted = self.wanted[0].iter().zip(&mut self.curvatures);
-        for (&c, (wanted, curvature)) in rounds.varying.iter().zip(wanted).take(count) {
+        for (&c, (wanted, curvature)) in rounds.varying.iter().zip(wanted) {
             self.cuts.reweight(&mut canvas.components[c], wanted, curvature);
         }
     }
@@ -215,9 +202,9 @@ pub(crate) fn match_slices<'a>(
             // Not both at once: together they would double the memory.
             coefficients = Vec::new();
             let oblique = oblique.get_or_insert_with(|| Oblique::new(rounds.size, rounds.levels, options.orientations));
-            for (&c, targets) in rounds.varying.iter().zip(rounds.targets[0]).take(rounds.principal()) {
+            for (&first, targets) in rounds.varying.iter().zip(rounds.targets[0]).take(1) {
                 for normal in &diagonals {
-                    errors.push(oblique.match_cuts(&mut canvas.components[c], normal, targets, matching));
+                    errors.push(oblique.match_cuts(&mut canvas.components[first], normal, targets, matching));
                     steps.next(report)?;
                 }
             }
@@ -227,9 +214,9 @@ pub(crate) fn match_slices<'a>(
         steps.say(report)?;
     }
     if options.mode == Mode::Slices && options.cuts == Cut::All && options.iterations > 0 {
-        convergence.reweight(&mut canvas, rounds, rounds.principal());
+        convergence.reweight(&mut canvas, rounds);
         canvas.match_channels();
-        convergence.reweight(&mut canvas, rounds, rounds.varying.len());
+        convergence.reweight(&mut canvas, rounds);
     }
     canvas.match_channels();
     report.final_error = convergence.error(&canvas, rounds);

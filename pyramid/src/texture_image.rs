@@ -16,8 +16,8 @@ use crate::{TextureError, TextureOptions, TextureReport};
 /// An image of any size that looks like the exemplar, and repeats without a seam.
 ///
 /// White noise gets the exemplar's distribution of colours and of the bands of its steerable pyramid, in turns; the colours
-/// are matched last. The exemplar's edges are taken care of by its periodic component, its channels by their principal
-/// axes. Of `options`, the mode is of no account. Same seed, same bits, at any number of threads.
+/// are matched last. The exemplar's edges are taken care of by its periodic component; three channels are taken as brightness and
+/// the principal axes of what it does not tell ([`crate::PrincipalColours::led_by`]). Of `options`, the mode is of no account. Same seed, same bits, at any number of threads.
 ///
 /// Cost: two pyramids of the result a round and channel; 512 x 512 in colour takes about a second.
 ///

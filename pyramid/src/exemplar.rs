@@ -145,10 +145,15 @@ impl Prepared {
         self.channels.len()
     }
 
+    /// Share of the variance that a component has.
+    pub(crate) fn share(&self, component: usize) -> f64 {
+        let variances = self.colours.variances();
+        variances[component] / variances.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
     /// Whether a component varies enough to have a texture.
     pub(crate) fn varies(&self, component: usize) -> bool {
-        let variances = self.colours.variances();
-        variances[component] > 1e-12 && variances[component] > 1e-9 * variances.iter().sum::<f64>()
+        self.colours.variances()[component] > 1e-12 && self.share(component) > 1e-9
     }
 
     /// Spectrum that the slices of a volume should have in one component: the mean over the exemplars.

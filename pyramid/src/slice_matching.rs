@@ -17,12 +17,16 @@ use crate::{Cut, Mode, TextureError, TextureOptions, TextureReport};
 /// How much nearer each slice's band powers are brought to the mean over the slices before matching, as an exponent: 0 lets
 /// some slices of a coarse texture have half of the contrast of others, 1 makes them all alike.
 const EVENNESS: f64 = 0.5;
+/// A colour component with a smaller share of the variance cannot move the others' bands when the channels are matched.
+const HARDLY_ANY: f64 = 0.02;
 
 /// What all rounds need to know.
 pub(crate) struct Rounds<'a> {
     pub(crate) size: [usize; 3],
     /// Colour components that vary, brightness first: it alone has its bands matched on oblique planes too.
     pub(crate) varying: &'a [usize],
+    /// The share of the variance that each has.
+    pub(crate) shares: Vec<f64>,
     /// By axis (z, y, x) and component that varies.
     pub(crate) targets: [&'a [BandTargets]; 3],
     pub(crate) options: &'a TextureOptions,
@@ -142,11 +146,13 @@ impl Convergence {
         if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 
-    /// Gives the cuts of all directions the band variances wanted on the first axis.
-    fn reweight(&mut self, canvas: &mut Canvas<'_>, rounds: &Rounds<'_>) {
+    /// Gives the cuts of all directions the band variances wanted on the first axis, in components of a share of `least` or more.
+    fn reweight(&mut self, canvas: &mut Canvas<'_>, rounds: &Rounds<'_>, least: f64) {
         let wanted = self.wanted[0].iter().zip(&mut self.curvatures);
-        for (&c, (wanted, curvature)) in rounds.varying.iter().zip(wanted) {
-            self.cuts.reweight(&mut canvas.components[c], wanted, curvature);
+        for ((&c, &share), (wanted, curvature)) in rounds.varying.iter().zip(&rounds.shares).zip(wanted) {
+            if share >= least {
+                self.cuts.reweight(&mut canvas.components[c], wanted, curvature);
+            }
         }
     }
 }
@@ -214,9 +220,9 @@ pub(crate) fn match_slices<'a>(
         steps.say(report)?;
     }
     if options.mode == Mode::Slices && options.cuts == Cut::All && options.iterations > 0 {
-        convergence.reweight(&mut canvas, rounds);
+        convergence.reweight(&mut canvas, rounds, HARDLY_ANY);
         canvas.match_channels();
-        convergence.reweight(&mut canvas, rounds);
+        convergence.reweight(&mut canvas, rounds, 0.0);
     }
     canvas.match_channels();
     report.final_error = convergence.error(&canvas, rounds);

@@ -172,6 +172,7 @@ fn synthesize(
     let rounds = Rounds {
         size,
         varying: &varying,
+        shares: varying.iter().map(|&c| prepared.share(c)).collect(),
         targets: [0, 1, 2].map(|axis: usize| targets[axis.min(targets.len() - 1)].as_slice()),
         options,
         levels: plan.levels,

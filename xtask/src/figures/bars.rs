@@ -23,8 +23,10 @@ pub struct Series<'a> {
 pub struct Panel<'a> {
     /// Its title.
     pub title: &'a str,
-    /// What the horizontal axis is; bars are spread evenly over 0 to 1.
+    /// What the horizontal axis is.
     pub across: &'a str,
+    /// Its ends; bars are spread evenly between them.
+    pub span: [f64; 2],
     /// What the vertical axis is.
     pub up: &'a str,
     /// Bars that stand beside each other.
@@ -70,12 +72,13 @@ fn draw_panel(
     } else {
         1.08
     };
+    let [first, last] = panel.span;
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .caption(panel.title, ("sans-serif", 17).into_font().color(&INK))
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(0.0..1.0, 0.0..headroom * top)?;
+        .build_cartesian_2d(first..last, 0.0..headroom * top)?;
     chart
         .configure_mesh()
         .disable_x_mesh()
@@ -86,9 +89,9 @@ fn draw_panel(
         .draw()?;
     let beside = panel.series.len() as f64;
     for (place, of) in panel.series.iter().enumerate() {
-        let bins = of.values.len() as f64;
-        let left = |i: usize| (i as f64 + 0.1 + 0.8 * place as f64 / beside) / bins;
-        let width = 0.8 / beside / bins;
+        let step = (last - first) / of.values.len() as f64;
+        let left = |i: usize| first + (i as f64 + 0.1 + 0.8 * place as f64 / beside) * step;
+        let width = 0.8 / beside * step;
         let bar =
             |(i, &value): (usize, &f64)| Rectangle::new([(left(i), 0.0), (left(i) + width, value)], of.colour.filled());
         let colour = of.colour;

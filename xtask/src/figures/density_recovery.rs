@@ -160,6 +160,7 @@ pub fn draw(folder: &Path) -> Result<()> {
         .map(|(of, (title, paper, auto, ends))| Panel {
             title,
             across: "diameter over the largest",
+            span: [0.0, 1.0],
             up: "particles per volume",
             series: vec![
                 Series {

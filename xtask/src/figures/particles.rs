@@ -41,6 +41,7 @@ pub fn draw_matrix(folder: &Path) -> Result<()> {
         .map(|((exact, swept, whiskers), title)| Panel {
             title,
             across: "profile diameter",
+            span: [0.0, 1.0],
             up: "K",
             series: vec![
                 Series {

@@ -369,7 +369,8 @@ fn distributions(path: &Path) -> Result<()> {
         .zip(&values)
         .map(|((title, _), values)| Panel {
             title,
-            across: "distance, -18 to 18 bins",
+            across: "distance, bins",
+            span: [-18.0, 18.0],
             up: "share",
             series: vec![Series {
                 name: "share",
@@ -409,7 +410,12 @@ fn porous(path: &Path) -> Result<RgbImage> {
             ..EstimateOptions::default()
         },
     )?;
-    let own = |shares: &[f64], share: f64| -> Vec<f64> { shares.iter().map(|s| s / share).collect() };
+    let longest = [&of, &seen].map(|of| of.negative().len().max(of.positive().len()));
+    let bins = longest[0].max(longest[1]);
+    let own = |shares: &[f64], share: f64| -> Vec<f64> {
+        let shares = shares.iter().map(|s| s / share);
+        shares.chain(std::iter::repeat(0.0)).take(bins).collect()
+    };
     let (phi, phi_seen) = (of.positive_share(), seen.positive_share());
     let parts = [
         (
@@ -425,6 +431,7 @@ fn porous(path: &Path) -> Result<RgbImage> {
         .map(|(values, seen, title, colour)| Panel {
             title,
             across: "distance R to the interface, bins of a voxel",
+            span: [0.0, bins as f64],
             up: "probability",
             series: vec![
                 Series {
@@ -462,9 +469,10 @@ fn merging(path: &Path) -> Result<()> {
     let merged = signed(&of, 8);
     let triangles = 20_480.0;
     let histogram: Vec<f64> = merged.iter().map(|share| (share * triangles).round()).collect();
-    let panel = |title, across, up, values, colour| Panel {
+    let panel = |title, span, up, values, colour| Panel {
         title,
-        across,
+        across: "distance, bins",
+        span,
         up,
         series: vec![Series {
             name: "share",
@@ -476,12 +484,24 @@ fn merging(path: &Path) -> Result<()> {
     bars::draw(
         path,
         &[
-            panel("negative region", "distance", "probability", negative.as_slice(), BLUE),
-            panel("positive region", "distance", "probability", positive.as_slice(), RED),
-            panel("merged", "distance, -8 to 8 bins", "share", merged.as_slice(), GREY),
+            panel(
+                "negative region",
+                [0.0, negative.len() as f64],
+                "probability",
+                negative.as_slice(),
+                BLUE,
+            ),
+            panel(
+                "positive region",
+                [0.0, positive.len() as f64],
+                "probability",
+                positive.as_slice(),
+                RED,
+            ),
+            panel("merged", [-8.0, 8.0], "share", merged.as_slice(), GREY),
             panel(
                 "histogram of 20,480 triangles",
-                "distance, -8 to 8 bins",
+                [-8.0, 8.0],
                 "triangles",
                 histogram.as_slice(),
                 GREY,

@@ -51,6 +51,7 @@ pub fn draw(folder: &Path) -> Result<()> {
         .map(|((name, likelihood, _), whiskers)| Panel {
             title: name,
             across: "√(A / A_max)",
+            span: [0.0, 1.0],
             up: "likelihood",
             series: vec![Series {
                 name: "",

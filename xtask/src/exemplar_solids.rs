@@ -118,7 +118,7 @@ pub fn solids(program: &Path, data: &Path, results: &Path, page: &Path) -> Resul
     replace_between(page, marks, &text)
 }
 
-/// The study of urs-2012 on pictures outside the project, raw and band-passed, solids of 48³.
+/// The study of urs-2012 on pictures outside the project, raw and band-passed, 128³ as there, one seed.
 pub fn laminar(data: &Path, page: &Path) -> Result<()> {
     let mut text = format!("\n{HEAD}");
     for name in ["fringe_synth_a_xz", "hrtem_soot_a_128"] {
@@ -129,11 +129,11 @@ pub fn laminar(data: &Path, page: &Path) -> Result<()> {
         let raw = Array2::from_shape_fn((picture.height() as usize, picture.width() as usize), |(y, x)| {
             f32::from(picture.get_pixel(x as u32, y as u32)[0]) / 255.0
         });
-        text.push_str(&table(name, &raw, 48, 1, false)?);
+        text.push_str(&table(name, &raw, 128, 1, false)?);
         text.push_str(&table(
             &format!("{name}, band-passed"),
             &band_passed(&raw)?,
-            48,
+            128,
             1,
             false,
         )?);

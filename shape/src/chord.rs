@@ -24,22 +24,26 @@ impl Chord {
 
     /// Of the line `origin + t direction` with a ball about the origin.
     pub(crate) fn of_ball(radius: f64, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Self {
-        let (a, b) = (direction.norm_squared(), origin.dot(direction));
-        let middle = -b / a;
+        let per_square = direction.norm_squared().recip();
+        let middle = -origin.dot(direction) * per_square;
         // From the nearest point: the difference of large squares would lose what a far origin holds.
         let nearest = (origin + middle * direction).norm_squared();
         let within = |radius: f64| {
-            let half = ((radius * radius - nearest) / a).sqrt();
+            let half = ((radius * radius - nearest) * per_square).sqrt();
             // Not a number if the line misses the ball.
             if half > 0.0 {
-                Some([middle - half, middle + half])
+                [middle - half, middle + half]
             } else {
-                None
+                Self::NONE.possible
             }
         };
+        let possible = within(radius + MARGIN);
+        if possible == Self::NONE.possible {
+            return Self::NONE;
+        }
         Self {
-            sure: within(radius - MARGIN).unwrap_or(Self::NONE.sure),
-            possible: within(radius + MARGIN).unwrap_or(Self::NONE.possible),
+            sure: within(radius - MARGIN),
+            possible,
         }
     }
 

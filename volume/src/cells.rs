@@ -51,6 +51,26 @@ struct Image {
     particle: u32,
 }
 
+/// The particle at each point of a row, or [`NONE`]; kept from row to row, as the next one mostly meets the same images.
+#[derive(Clone, Debug)]
+pub(crate) struct Marks {
+    pub(crate) ids: Vec<u32>,
+    /// The images near to a row of cells at a z.
+    near: Vec<Image>,
+    near_to: Option<(usize, f64)>,
+}
+
+impl Marks {
+    /// For rows of so many points.
+    pub(crate) fn new(points: usize) -> Self {
+        Self {
+            ids: vec![NONE; points],
+            near: Vec::new(),
+            near_to: None,
+        }
+    }
+}
+
 /// How a cell lies to a particle.
 #[derive(Clone, Copy, PartialEq)]
 enum Cover {
@@ -190,17 +210,31 @@ impl Cells {
             .map(|image| image.particle as usize)
     }
 
-    /// The particle at each point of a row of the box, or [`NONE`]: what [`Self::particle_at`] says, at the cost of a chord a particle.
-    pub(crate) fn particles_along(&self, bodies: &[UnitBody], row: &Row, ids: &mut [u32]) {
-        ids.fill(NONE);
+    /// Marks the particle at each point of a row of the box: what [`Self::particle_at`] says, at the cost of a chord a particle.
+    pub(crate) fn particles_along(&self, bodies: &[UnitBody], row: &Row, marks: &mut Marks) {
+        marks.ids.fill(NONE);
         let [_, j, k] = self.cell_of(&Point3::new(0.0, row.y, row.z));
+        if marks.near_to != Some((j, row.z)) {
+            marks.near_to = Some((j, row.z));
+            self.gather_near([j, k], row.z, &mut marks.near);
+        }
+        for image in &marks.near {
+            self.mark(bodies, image, row, &mut marks.ids);
+        }
+    }
+
+    /// The images that reach into a row of cells, and to a z there.
+    fn gather_near(&self, [j, k]: [usize; 2], z: f64, near: &mut Vec<Image>) {
+        near.clear();
         let mut before: &[Image] = &[];
         for i in 0..self.counts[0] {
             let images = self.images_in(self.number([i, j, k]));
             for image in images {
+                let up = z - image.centre.z;
                 let same = |other: &Image| other.particle == image.particle && other.centre == image.centre;
-                if !before.iter().any(same) {
-                    self.mark(bodies, image, row, ids);
+                // An image that reaches in again farther on is marked twice, which does no harm.
+                if up * up < image.outer_squared && !before.iter().any(same) {
+                    near.push(*image);
                 }
             }
             before = images;
@@ -222,12 +256,15 @@ impl Cells {
         let chord = body.chord(&placed.local(&beside), &placed.to_local.column(0).into_owned());
         let (sure, possible) = chord.map_or(([0.0; 2], [-half, half]), |chord| (chord.sure, chord.possible));
         let [from, end] = possible.map(|end| row.count_to(image.centre.x + end, ids.len()));
-        for (i, id) in ids.iter_mut().enumerate().take(end).skip(from) {
+        let along = |i: &usize| row.x(*i) - image.centre.x;
+        let first = (from..end).find(|i| along(i) > sure[0]).unwrap_or(end);
+        let last = (first..end).rfind(|i| along(i) < sure[1]).map_or(first, |i| i + 1);
+        let mut set = |i: usize| ids[i] = ids[i].min(image.particle);
+        (first..last).for_each(&mut set);
+        for i in (from..first).chain(last..end) {
             let offset = offset(row.x(i));
-            let is_inside = offset.x > sure[0] && offset.x < sure[1]
-                || offset.norm_squared() < image.outer_squared && body.contains(&placed.local(&offset));
-            if is_inside {
-                *id = (*id).min(image.particle);
+            if offset.norm_squared() < image.outer_squared && body.contains(&placed.local(&offset)) {
+                set(i);
             }
         }
     }

@@ -5,9 +5,11 @@
     reason = "colours are f32; places are in the box and positive"
 )]
 
+use crate::colour::{Lanes, lanes};
 use nalgebra::{Point3, Vector3};
 use ndarray::{Array4, ArrayView4};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Fine detail to add to the mean colours: one volume for the binder, one for the particles (section 4.3).
 #[derive(Clone, Debug, PartialEq)]
@@ -47,9 +49,6 @@ pub enum Lookup {
 
 const MOST_GAIN: f32 = 8.0;
 
-/// Three channels and a fourth of no account, so that they are worked out at once.
-type Lanes = [f32; 4];
-
 /// A repeating colour volume prepared for lookups.
 #[derive(Clone, Debug)]
 pub(crate) struct Field {
@@ -58,9 +57,9 @@ pub(crate) struct Field {
     voxels_per_length: Vector3<f64>,
     /// x fastest.
     samples: Vec<[f32; 3]>,
-    mean: [f32; 3],
+    mean: Lanes,
     /// Autocovariance at lag (a, b, c) at index a + 2b + 4c, of each channel.
-    covariance: [[f32; 3]; 8],
+    covariance: [Lanes; 8],
 }
 
 impl Field {
@@ -72,8 +71,8 @@ impl Field {
             sizes: [nx, ny, nz],
             voxels_per_length,
             samples,
-            mean: [0.0; 3],
-            covariance: [[0.0; 3]; 8],
+            mean: Lanes::ZERO,
+            covariance: [Lanes::ZERO; 8],
         };
         field.measure();
         field
@@ -106,7 +105,7 @@ impl Field {
                 })
             })
         };
-        let mut covariance = [[0.0; 3]; 8];
+        let mut covariance = [Lanes::ZERO; 8];
         for (index, average) in covariance.iter_mut().enumerate() {
             let [a, b, c] = [index & 1, index >> 1 & 1, index >> 2 & 1];
             // A lag and its opposite are the same; of the others every sign counts.
@@ -128,48 +127,51 @@ impl Field {
                 distinct.truncate(2);
             }
             let sum = distinct.iter().map(|&(b, c)| lagged(a, b, c)).fold([0.0; 3], plus);
-            *average = sum.map(|sum| (sum / distinct.len() as f64) as f32);
+            *average = lanes(sum.map(|sum| (sum / distinct.len() as f64) as f32));
         }
-        self.mean = mean.map(|mean| mean as f32);
+        self.mean = lanes(mean.map(|mean| mean as f32));
         self.covariance = covariance;
     }
 
     /// The field at a point of the box.
     pub(crate) fn at(&self, p: &Point3<f64>, lookup: Lookup) -> [f32; 3] {
-        self.row([p.y, p.z], lookup).at(p.x)
+        let row = self.row([p.y, p.z], lookup);
+        let Between { low, high, share } = self.between(0, p.x, lookup);
+        let ends = [low, high].map(|voxel| row.blend(voxel));
+        let [r, g, b, _] = row.between(ends, share, row.gain(share)).to_array();
+        [r, g, b]
+    }
+
+    /// Where points along x lie between the voxels, for [`FieldRow::ready_at`].
+    pub(crate) fn places(&self, points: impl Iterator<Item = f64>, lookup: Lookup) -> Places {
+        let between: Vec<Between> = points.map(|x| self.between(0, x, lookup)).collect();
+        let mut voxels: Vec<usize> = between.iter().flat_map(|place| [place.low, place.high]).collect();
+        voxels.sort_unstable();
+        voxels.dedup();
+        let mut shares: Vec<f32> = between.iter().map(|place| place.share).collect();
+        shares.sort_unstable_by(f32::total_cmp);
+        shares.dedup();
+        let voxel = |v: usize| voxels.binary_search(&v).unwrap_or_else(|above| above) as u32;
+        let place = |of: &Between| Place {
+            low: voxel(of.low),
+            high: voxel(of.high),
+            share: shares.partition_point(|share| *share < of.share) as u32,
+        };
+        let places = between.iter().map(place).collect();
+        Places { voxels, shares, places }
     }
 
     /// The field along a row of the box.
     pub(crate) fn row(&self, yz: [f64; 2], lookup: Lookup) -> FieldRow<'_> {
         let [nx, ny, _] = self.sizes;
         let start = |y: usize, z: usize| (z * ny + y) * nx;
-        if lookup == Lookup::Nearest {
-            let [y, z] = [0, 1].map(|k| (yz[k] * self.voxels_per_length[k + 1]) as usize % self.sizes[k + 1]);
-            return FieldRow {
-                field: self,
-                lookup,
-                starts: [start(y, z); 4],
-                weights: [1.0, 0.0, 0.0, 0.0],
-                variance: [[0.0; 4]; 2],
-                whole: [1.0; 4],
-                blended: Vec::new(),
-            };
-        }
-        let [y, z] = [0, 1].map(|k| self.between(k + 1, yz[k]));
+        let [y, z] = [0, 1].map(|k| self.between(k + 1, yz[k], lookup));
         let [ay, az] = [y, z].map(|of| 2.0 * of.share * (1.0 - of.share));
-        let weights = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
-        let (mut variance, mut whole) = ([[0.0; 4]; 2], [1.0; 4]);
-        for c in 0..3 {
-            if self.covariance[0][c] > 0.0 {
-                whole[c] = self.covariance[0][c];
-                for (lag, covariance) in self.covariance.iter().enumerate() {
-                    variance[lag & 1][c] += weights[lag >> 1] * covariance[c];
-                }
-            }
-        }
+        let left = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
+        let at_x = |a: usize| (0..4).fold(Lanes::ZERO, |sum, lag| sum + self.covariance[2 * lag + a] * left[lag]);
+        let at_voxels = at_x(0);
         FieldRow {
             field: self,
-            lookup,
             starts: [
                 start(y.low, z.low),
                 start(y.high, z.low),
@@ -181,16 +183,24 @@ impl Field {
                 y.share * (1.0 - z.share),
                 (1.0 - y.share) * z.share,
                 y.share * z.share,
-            ],
-            variance,
-            whole,
-            blended: Vec::new(),
+            ]
+            .map(Lanes::splat),
+            variance: [at_voxels, at_x(1) - at_voxels],
+            keeps_variance: lookup == Lookup::VarianceKept,
         }
     }
 
-    /// The voxels on both sides of a place along an axis.
-    fn between(&self, axis: usize, x: f64) -> Between {
+    /// The voxels on both sides of a place along an axis; twice the one that holds it if the nearest is wanted.
+    fn between(&self, axis: usize, x: f64, lookup: Lookup) -> Between {
         let n = self.sizes[axis];
+        if lookup == Lookup::Nearest {
+            let voxel = (x * self.voxels_per_length[axis]) as usize % n;
+            return Between {
+                low: voxel,
+                high: voxel,
+                share: 0.0,
+            };
+        }
         // Half a voxel off the centres, and a whole period on, so that it is positive.
         let place = x * self.voxels_per_length[axis] - 0.5 + n as f64;
         let floor = place as usize;
@@ -211,50 +221,43 @@ struct Between {
     share: f32,
 }
 
+/// Where the points of a row lie: what is worked out for a voxel or a share is so once, however many points have it. Grids that fit each other have few shares.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    /// The voxels that are read, ascending.
+    voxels: Vec<usize>,
+    /// The shares that occur, ascending.
+    shares: Vec<f32>,
+    /// Of each point, places in the two lists.
+    places: Vec<Place>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    low: u32,
+    high: u32,
+    share: u32,
+}
+
 /// A field at one y and z.
 pub(crate) struct FieldRow<'a> {
     field: &'a Field,
-    lookup: Lookup,
     /// Where the rows of voxels around it begin, and their shares.
     starts: [usize; 4],
-    weights: [f32; 4],
-    /// What trilinear weights leave of the variance: at the voxels' x, and what is in it of their neighbours'.
+    weights: [Lanes; 4],
+    /// What trilinear weights leave of the variance: at the voxels' x, and how it falls between them.
     variance: [Lanes; 2],
-    /// Variance of the voxels; 1 where they do not vary.
-    whole: Lanes,
-    /// The four rows blended, if they are to be read more than once.
-    blended: Vec<Lanes>,
+    keeps_variance: bool,
 }
 
-impl FieldRow<'_> {
-    /// The same row, to be read at `reads` places: blended at once if that is less work.
-    pub(crate) fn prepared_for(mut self, reads: usize) -> Self {
-        if 2 * reads > self.field.sizes[0] {
-            self.blended = (0..self.field.sizes[0]).map(|voxel| self.blend(voxel)).collect();
-        }
-        self
-    }
-
-    /// The field at an x; the same bits prepared or not.
-    pub(crate) fn at(&self, x: f64) -> [f32; 3] {
-        let place = self.place(x);
-        if self.blended.is_empty() {
-            self.between(self.blend(place.low), self.blend(place.high), place.share)
-        } else {
-            self.between(self.blended[place.low], self.blended[place.high], place.share)
-        }
-    }
-
-    fn place(&self, x: f64) -> Between {
-        if self.lookup == Lookup::Nearest {
-            let voxel = (x * self.field.voxels_per_length.x) as usize % self.field.sizes[0];
-            Between {
-                low: voxel,
-                high: voxel,
-                share: 0.0,
-            }
-        } else {
-            self.field.between(0, x)
+impl<'a> FieldRow<'a> {
+    /// The row, ready to be read at places: the same bits as [`Field::at`].
+    pub(crate) fn ready_at(self, places: &'a Places) -> ReadyRow<'a> {
+        ReadyRow {
+            blended: places.voxels.iter().map(|&voxel| self.blend(voxel)).collect(),
+            shares: places.shares.iter().map(|&share| (share, self.gain(share))).collect(),
+            places: &places.places,
+            row: self,
         }
     }
 
@@ -262,28 +265,49 @@ impl FieldRow<'_> {
     fn blend(&self, voxel: usize) -> Lanes {
         let [a, b, c, d] = self.starts.map(|start| lanes(self.field.samples[start + voxel]));
         let w = self.weights;
-        [0, 1, 2, 3].map(|k| (w[0] * a[k] + w[1] * b[k]) + (w[2] * c[k] + w[3] * d[k]))
+        (w[0] * a + w[1] * b) + (w[2] * c + w[3] * d)
     }
 
-    fn between(&self, low: Lanes, high: Lanes, f: f32) -> [f32; 3] {
-        let mut value = [0, 1, 2, 3].map(|c| (1.0 - f) * low[c] + f * high[c]);
-        if self.lookup == Lookup::VarianceKept {
-            let apart = 2.0 * f * (1.0 - f);
-            let mean = lanes(self.field.mean);
-            let left = [0, 1, 2, 3].map(|c| (1.0 - apart) * self.variance[0][c] + apart * self.variance[1][c]);
-            let gain = [0, 1, 2, 3].map(|c| {
-                let least = self.whole[c] / MOST_GAIN;
-                let left = if left[c] > least { left[c] } else { least };
-                (self.whole[c] / left).sqrt()
-            });
-            value = [0, 1, 2, 3].map(|c| mean[c] + (value[c] - mean[c]) * gain[c]);
+    /// Between two blended voxels, contrast restored.
+    fn between(&self, [low, high]: [Lanes; 2], share: f32, gain: Lanes) -> Lanes {
+        let value = low * Lanes::splat(1.0 - share) + high * Lanes::splat(share);
+        if self.keeps_variance {
+            self.field.mean + (value - self.field.mean) * gain
+        } else {
+            value
         }
-        [value[0], value[1], value[2]]
+    }
+
+    /// By what contrast is raised between two voxels.
+    fn gain(&self, share: f32) -> Lanes {
+        let apart = Lanes::splat(2.0 * share * (1.0 - share));
+        let left = self.variance[0] + apart * self.variance[1];
+        let whole = self.field.covariance[0];
+        // Where voxels do not vary there is nothing to raise.
+        let whole = whole.simd_gt(Lanes::ZERO).select(whole, Lanes::ONE);
+        let least = whole * Lanes::splat(1.0 / MOST_GAIN);
+        (whole / left.simd_gt(least).select(left, least)).sqrt()
     }
 }
 
-fn lanes([r, g, b]: [f32; 3]) -> Lanes {
-    [r, g, b, 0.0]
+/// A field along a row, read at places.
+pub(crate) struct ReadyRow<'a> {
+    row: FieldRow<'a>,
+    blended: Vec<Lanes>,
+    /// Each share with its gain.
+    shares: Vec<(f32, Lanes)>,
+    places: &'a [Place],
+}
+
+impl ReadyRow<'_> {
+    /// The field at points `of` the places, in their order.
+    pub(crate) fn values(&self, of: Range<usize>) -> impl Iterator<Item = Lanes> + '_ {
+        self.places[of].iter().map(|place| {
+            let ends = [place.low, place.high].map(|voxel| self.blended[voxel as usize]);
+            let (share, gain) = self.shares[place.share as usize];
+            self.row.between(ends, share, gain)
+        })
+    }
 }
 
 fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -319,9 +343,9 @@ mod tests {
             let (sum, square) = all.fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
             let mean = sum / 4096.0;
             let variance = square / 4096.0 - mean * mean;
-            assert!((mean - f64::from(field.mean[1])).abs() < 1e-5);
+            assert!((mean - f64::from(field.mean.to_array()[1])).abs() < 1e-5);
             assert!(
-                (variance / f64::from(field.covariance[0][1]) - 1.0).abs() < 1e-4,
+                (variance / f64::from(field.covariance[0].to_array()[1]) - 1.0).abs() < 1e-4,
                 "{share:?} {variance}"
             );
         }

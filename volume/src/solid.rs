@@ -1,8 +1,8 @@
 //! The solid: what is at a point of a material that repeats.
 
-use crate::cells::Cells;
+use crate::cells::{Cells, Marks};
 use crate::colour::add;
-use crate::residual::{Field, FieldRow, Lookup, Residual};
+use crate::residual::{Field, Lookup, Residual};
 use crate::row::Row;
 use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
@@ -334,17 +334,17 @@ impl Solid {
     }
 
     /// The particle at each point of a row of the box, for [`index`](crate::row::index): the same as [`Self::id_within`] says.
-    pub(crate) fn ids_along(&self, row: &Row, ids: &mut [u32]) {
-        self.cells.particles_along(&self.bodies, row, ids);
+    pub(crate) fn ids_along(&self, row: &Row, marks: &mut Marks) {
+        self.cells.particles_along(&self.bodies, row, marks);
     }
 
-    /// The residual of binder and particles along a row, to be read at so many points.
-    pub(crate) fn residual_along(&self, row: &Row, points: usize) -> Option<[FieldRow<'_>; 2]> {
-        let fields = self.residual.as_ref()?;
-        Some(
-            [&fields.binder, &fields.particles]
-                .map(|field| field.row([row.y, row.z], self.lookup).prepared_for(points)),
-        )
+    /// The residuals of binder and particles.
+    pub(crate) fn fields(&self) -> Option<[&Field; 2]> {
+        self.residual.as_ref().map(|fields| [&fields.binder, &fields.particles])
+    }
+
+    pub(crate) fn lookup(&self) -> Lookup {
+        self.lookup
     }
 
     pub(crate) fn mean_colour(&self, id: Option<usize>) -> [f32; 3] {
@@ -353,10 +353,8 @@ impl Solid {
 
     /// The residual at a point of the box, of the particles or of the binder.
     pub(crate) fn residual_within(&self, p: &Point3<f64>, in_particle: bool) -> [f32; 3] {
-        self.residual.as_ref().map_or([0.0; 3], |fields| {
-            let field = if in_particle { &fields.particles } else { &fields.binder };
-            field.at(p, self.lookup)
-        })
+        self.fields()
+            .map_or([0.0; 3], |fields| fields[usize::from(in_particle)].at(p, self.lookup))
     }
 
     /// Edge of the residual's voxels.

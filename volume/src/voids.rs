@@ -1,6 +1,6 @@
 //! Particles that are voids: the pores of a sponge, the bubbles of a foam.
 
-use crate::cells::{Cells, NONE};
+use crate::cells::{Cells, Marks, NONE};
 use crate::row::Row;
 use crate::{Solid, SolidError};
 use nalgebra::Point3;
@@ -76,10 +76,10 @@ impl Solid {
     }
 
     /// The void at each point of a row of the box.
-    pub(crate) fn voids_along(&self, row: &Row, ids: &mut [u32]) {
+    pub(crate) fn voids_along(&self, row: &Row, marks: &mut Marks) {
         match &self.voids {
-            Some(voids) => voids.cells.particles_along(self.bodies(), row, ids),
-            None => ids.fill(NONE),
+            Some(voids) => voids.cells.particles_along(self.bodies(), row, marks),
+            None => marks.ids.fill(NONE),
         }
     }
 

@@ -6,10 +6,11 @@
 )]
 
 use crate::Solid;
-use crate::colour::to_bytes;
+use crate::cells::Marks;
+use crate::colour::{Lanes, to_bytes};
 use crate::row::{Row, index};
 use nalgebra::{Point3, Vector3};
-use ndarray::{ArrayViewMut2, ArrayViewMut3};
+use ndarray::{ArrayViewMut2, ArrayViewMut3, aview2};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -84,12 +85,7 @@ impl VoxelGrid {
     /// The points at this offset from the centres of a row of voxels.
     fn row(&self, y: usize, z: usize, offset: &Vector3<f64>) -> Row {
         let first = self.centre([0, y, z]) + offset;
-        Row {
-            y: first.y,
-            z: first.z,
-            step: self.spacing[0],
-            shift: offset.x,
-        }
+        Row::new([first.y, first.z], self.spacing[0], offset.x)
     }
 }
 
@@ -133,32 +129,38 @@ impl Solid {
         let offsets: Vec<Vector3<f64>> = (0..n.pow(3))
             .map(|i| Vector3::new(along(i % n, 0), along(i / n % n, 1), along(i / n / n, 2)))
             .collect();
-        let share = 1.0 / offsets.len() as f32;
-        let buffers = || (vec![0; grid.counts[0]], vec![[0.0; 3]; grid.counts[0]]);
-        let fill = |(ids, sums): &mut (Vec<u32>, Vec<[f32; 3]>), (y, mut voxels): (usize, ArrayViewMut2<'_, u8>)| {
-            sums.fill([0.0; 3]);
-            for offset in &offsets {
+        // Those of the first n offsets are those of all.
+        let [nx, ..] = grid.counts;
+        let places: Vec<_> = offsets[..n]
+            .iter()
+            .map(|offset| self.places_along(&grid.row(0, z, offset), nx))
+            .collect();
+        let share = Lanes::splat(1.0 / offsets.len() as f32);
+        let buffers = || (Marks::new(nx), vec![Lanes::ZERO; nx], Vec::with_capacity(nx));
+        let fill = |(marks, sums, bytes): &mut (Marks, Vec<Lanes>, Vec<[u8; 3]>),
+                    (y, mut voxels): (usize, ArrayViewMut2<'_, u8>)| {
+            sums.fill(Lanes::ZERO);
+            for (offset, places) in offsets.iter().zip(places.iter().cycle()) {
                 let row = grid.row(y, z, offset);
-                self.ids_along(&row, ids);
-                self.add_colours_along(&row, ids, sums);
+                self.ids_along(&row, marks);
+                self.add_colours_along(&row, &marks.ids, places.as_ref(), sums);
             }
-            for (mut voxel, sum) in voxels.outer_iter_mut().zip(sums) {
-                let bytes = to_bytes(sum.map(|c| c * share));
-                (0..3).for_each(|c| voxel[c] = bytes[c]);
-            }
+            bytes.clear();
+            bytes.extend(sums.iter().map(|sum| to_bytes(*sum * share)));
+            voxels.assign(&aview2(bytes));
         };
         rows(&mut slab).into_par_iter().enumerate().for_each_init(buffers, fill);
     }
 
     /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
-        let ids = |row: &Row, ids: &mut [u32]| self.ids_along(row, ids);
+        let ids = |row: &Row, marks: &mut Marks| self.ids_along(row, marks);
         fill_by_id(grid, z, slab, ids, |id| id.map_or(0, |id| id as u32 + 1));
     }
 
     /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
     pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        let ids = |row: &Row, ids: &mut [u32]| self.ids_along(row, ids);
+        let ids = |row: &Row, marks: &mut Marks| self.ids_along(row, marks);
         fill_by_id(grid, z, slab, ids, |id| {
             id.map_or(0, |id| self.particles()[id].category + 1)
         });
@@ -175,7 +177,7 @@ impl Solid {
 
     /// Fills the slab at `z` with 0 in voids, else 255.
     pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        let voids = |row: &Row, ids: &mut [u32]| self.voids_along(row, ids);
+        let voids = |row: &Row, marks: &mut Marks| self.voids_along(row, marks);
         fill_by_id(grid, z, slab, voids, |void| if void.is_some() { 0 } else { 255 });
     }
 
@@ -293,13 +295,13 @@ fn fill_by_id<T: Send>(
     grid: &VoxelGrid,
     z: usize,
     mut slab: ArrayViewMut3<'_, T>,
-    ids_along: impl Fn(&Row, &mut [u32]) + Sync,
+    mark: impl Fn(&Row, &mut Marks) + Sync,
     value: impl Fn(Option<usize>) -> T + Sync,
 ) {
-    let buffer = || vec![0; grid.counts[0]];
-    let fill = |ids: &mut Vec<u32>, (y, mut voxels): (usize, ArrayViewMut2<'_, T>)| {
-        ids_along(&grid.row(y, z, &Vector3::zeros()), ids);
-        for (voxel, &id) in voxels.iter_mut().zip(ids.iter()) {
+    let buffer = || Marks::new(grid.counts[0]);
+    let fill = |marks: &mut Marks, (y, mut voxels): (usize, ArrayViewMut2<'_, T>)| {
+        mark(&grid.row(y, z, &Vector3::zeros()), marks);
+        for (voxel, &id) in voxels.iter_mut().zip(&marks.ids) {
             *voxel = value(index(id));
         }
     };

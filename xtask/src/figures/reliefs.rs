@@ -1,23 +1,24 @@
 //! Figures 1 to 9 of Schroeder et al. 2005 (stochastic microgeometry), on meshes from formulas.
 
-use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use image::{RgbImage, imageops};
 use nalgebra::{Point3, Vector3};
-use ndarray::{Array2, Array3, Axis};
+use ndarray::{Array3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::microgeometry::{
-    ContactDistribution, Counting, EstimateOptions, Law, Offset, ReconstructOptions, contact_of_picture,
-    contact_of_volume, displace, reconstruct, refined, to_distribution_units,
+    ContactDistribution, Counting, EstimateOptions, Offset, ReconstructOptions, contact_of_volume, displace,
+    reconstruct, to_distribution_units,
 };
 use stereology::render::{Camera, RenderOptions, render_mesh};
-use stereology::shape::{Body, Subdivision, TriangleMesh};
+use stereology::shape::{Body, TriangleMesh};
 
 use super::bars::{self, BLUE, GREY, Panel, RED, Series};
+use super::nearest_vertex::Nearest;
+use super::relief_recipes::{Recipe, ball, bar, blade, bust, chipped, clay, coral, crisped, disc, fine, planet, ring};
 use super::solids::row;
 
 const SIDE: u32 = 300;
@@ -37,97 +38,6 @@ pub fn draw(folder: &Path) -> Result<()> {
     distributions(&folder.join("microgeometry-07-distributions.svg"))?;
     figure("08-porous-slice", porous(&folder.join("microgeometry-08-porous.svg"))?)?;
     merging(&folder.join("microgeometry-09-merging.svg"))
-}
-
-/// A relief's recipe.
-struct Recipe {
-    contact: ContactDistribution,
-    units: f64,
-    negative: &'static str,
-    positive: &'static str,
-    colours: [[f32; 3]; 2],
-}
-
-fn laws(negative: Law, positive: Law, share: f64) -> Result<ContactDistribution> {
-    Ok(ContactDistribution::from_laws(1.0, negative, positive, share)?)
-}
-
-/// Light and dark of a random field: the plainest of textures.
-fn field() -> Result<ContactDistribution> {
-    let mut random = ChaCha8Rng::seed_from_u64(7);
-    let waves: Vec<[f64; 3]> = (0..80)
-        .map(|_| {
-            let (turn, k) = (
-                TAU * random.random::<f64>(),
-                TAU / 26.0 * (0.6 + 0.8 * random.random::<f64>()),
-            );
-            [k * turn.cos(), k * turn.sin(), TAU * random.random::<f64>()]
-        })
-        .collect();
-    let picture = Array2::from_shape_fn((400, 400), |(y, x)| {
-        waves
-            .iter()
-            .map(|[ky, kx, phase]| (ky * y as f64 + kx * x as f64 + phase).cos())
-            .sum::<f64>()
-            > 0.0
-    });
-    Ok(contact_of_picture(picture.view(), &EstimateOptions::default())?)
-}
-
-fn fine(mesh: TriangleMesh, edge: f64) -> Result<TriangleMesh> {
-    Ok(refined(&mesh, Subdivision::Midpoint, edge)?)
-}
-
-/// A box with rounded edges: split first, so that Loop's scheme rounds the edges alone.
-fn bar() -> Result<TriangleMesh> {
-    let boxy = fine(TriangleMesh::cuboid([2.0, 0.72, 0.84]), 0.22)?;
-    Ok(refined(&boxy, Subdivision::Loop, 0.028)?)
-}
-
-fn disc() -> Result<TriangleMesh> {
-    fine(
-        Body::superellipsoid([1.0, 0.28, 1.0], [0.6, 1.0])?.to_triangles(5),
-        0.03,
-    )
-}
-
-fn ball() -> TriangleMesh {
-    TriangleMesh::icosphere(2.0, 6)
-}
-
-fn ring() -> TriangleMesh {
-    TriangleMesh::torus(1.4, 0.6, 200, 90)
-}
-
-/// From 0 to 1 between two places, without corners.
-fn smooth(from: f64, to: f64, at: f64) -> f64 {
-    let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// An arrowhead: a tang, barbs, a tip.
-fn blade() -> Result<TriangleMesh> {
-    let shaped = TriangleMesh::icosphere(2.0, 6).mapped(|p| {
-        let along = 0.5 * (p.y + 1.0);
-        let tang = 0.2 * smooth(0.0, 0.1, along);
-        let head = 0.72 * (1.0 - along).powf(0.85);
-        let wide = tang + (head - tang) * smooth(0.2, 0.32, along);
-        let round = p.x.hypot(p.z).max(1e-9);
-        let thick = 0.17 * (1.0 - along).sqrt() * smooth(0.0, 0.15, along);
-        Point3::new(wide * p.x / round, 1.05 * p.y, thick * p.z / round)
-    });
-    fine(shaped, 0.026)
-}
-
-/// A head of a kind: a long ellipsoid on a neck.
-fn bust() -> Result<TriangleMesh> {
-    let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
-        let t = (PI * (p.y + 1.0) / 2.0).clamp(0.0, PI);
-        let wide = 0.34 + 0.14 * (1.0 + (2.0 * (t - 2.1)).cos());
-        let nose = 0.16 * (-16.0 * (p.x * p.x + (p.y - 0.25).powi(2))).exp() * p.z.max(0.0);
-        Point3::new(wide * p.x, 1.1 * p.y, (wide * 1.1) * p.z + nose)
-    });
-    fine(shaped, 0.03)
 }
 
 fn labels(mesh: &TriangleMesh, of: &Recipe, seed: u64) -> Result<Vec<f64>> {
@@ -182,56 +92,6 @@ fn rows(parts: Vec<RgbImage>, columns: usize) -> RgbImage {
         imageops::replace(&mut whole, line, 0, y);
     }
     whole
-}
-
-fn chipped() -> Result<Recipe> {
-    Ok(Recipe {
-        contact: field()?,
-        units: 60.0,
-        negative: "in,0.012,sqrt",
-        positive: "out,0.012,sqrt",
-        colours: [[0.16, 0.42, 0.44], [0.36, 0.68, 0.66]],
-    })
-}
-
-fn coral() -> Result<Recipe> {
-    Ok(Recipe {
-        contact: laws(Law::Disc(5.0), Law::Disc(2.2), 0.34)?,
-        units: 50.0,
-        negative: "in,0.03,sqrt",
-        positive: "out,0.006,sqrt",
-        colours: [[0.62, 0.3, 0.26], [0.93, 0.78, 0.68]],
-    })
-}
-
-fn crisped() -> Result<Recipe> {
-    Ok(Recipe {
-        contact: laws(Law::Uniform(2.2), Law::Disc(4.2), 0.52)?,
-        units: 40.0,
-        negative: "none",
-        positive: "out,0.03,sqrt",
-        colours: [[0.3, 0.17, 0.09], [0.42, 0.25, 0.14]],
-    })
-}
-
-fn clay() -> Result<Recipe> {
-    Ok(Recipe {
-        contact: laws(Law::Disc(5.0), Law::Disc(6.0), 0.54)?,
-        units: 30.0,
-        negative: "in,0.02,sqrt",
-        positive: "out,0.012,sqrt",
-        colours: [[0.34, 0.3, 0.27], [0.52, 0.47, 0.42]],
-    })
-}
-
-fn planet() -> Result<Recipe> {
-    Ok(Recipe {
-        contact: laws(Law::Exponential(5.0), Law::Exponential(2.5), 0.35)?,
-        units: 36.65,
-        negative: "none",
-        positive: "out,0.016,sqrt",
-        colours: [[0.12, 0.27, 0.5], [0.5, 0.54, 0.3]],
-    })
 }
 
 /// Figure 1: arrowhead, coral disc, candy bar, head, planet.
@@ -509,95 +369,4 @@ fn merging(path: &Path) -> Result<()> {
         ],
         2,
     )
-}
-
-/// The nearest vertex of a mesh, by cells.
-struct Nearest<'a> {
-    points: &'a [Point3<f64>],
-    low: Point3<f64>,
-    cell: f64,
-    sides: [usize; 3],
-    starts: Vec<usize>,
-    order: Vec<u32>,
-}
-
-impl<'a> Nearest<'a> {
-    fn new(mesh: &'a TriangleMesh) -> Self {
-        let points = &mesh.vertices;
-        let (low, high) = mesh.bounding_box().unwrap_or_default();
-        // A few points a cell of a surface.
-        let cell = ((high - low).amax() / (points.len().max(1) as f64 / 6.0).sqrt()).max(1e-9);
-        let sides = [0, 1, 2].map(|k| ((high[k] - low[k]) / cell) as usize + 1);
-        let mut made = Self {
-            points,
-            low,
-            cell,
-            sides,
-            starts: vec![0; sides.iter().product::<usize>() + 1],
-            order: (0..points.len() as u32).collect(),
-        };
-        let cells: Vec<usize> = points.iter().map(|p| made.index(made.place(p))).collect();
-        made.order.sort_by_key(|&v| cells[v as usize]);
-        for &cell in &cells {
-            made.starts[cell + 1] += 1;
-        }
-        for cell in 1..made.starts.len() {
-            made.starts[cell] += made.starts[cell - 1];
-        }
-        made
-    }
-
-    fn place(&self, p: &Point3<f64>) -> [usize; 3] {
-        [0, 1, 2].map(|k| (((p[k] - self.low[k]) / self.cell).max(0.0) as usize).min(self.sides[k] - 1))
-    }
-
-    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
-        (z * self.sides[1] + y) * self.sides[0] + x
-    }
-
-    /// Mean of the values about a point, the near ones above all.
-    fn mean(&self, p: &Point3<f64>, values: &[f64]) -> f64 {
-        let place = self.place(p);
-        let range = |k: usize| place[k].saturating_sub(1)..=(place[k] + 1).min(self.sides[k] - 1);
-        let (mut sum, mut of) = (0.0, 1e-300);
-        for z in range(2) {
-            for y in range(1) {
-                for x in range(0) {
-                    let cell = self.index([x, y, z]);
-                    for &v in &self.order[self.starts[cell]..self.starts[cell + 1]] {
-                        let far = (self.points[v as usize] - p).norm_squared() / (self.cell * self.cell);
-                        let weight = (-16.0 * far).exp();
-                        sum += weight * values[v as usize];
-                        of += weight;
-                    }
-                }
-            }
-        }
-        sum / of
-    }
-
-    fn vertex(&self, p: &Point3<f64>) -> Option<usize> {
-        let place = self.place(p);
-        let mut best: Option<(f64, u32)> = None;
-        for reach in 1..4_usize {
-            let range = |k: usize| place[k].saturating_sub(reach)..=(place[k] + reach).min(self.sides[k] - 1);
-            for z in range(2) {
-                for y in range(1) {
-                    for x in range(0) {
-                        let cell = self.index([x, y, z]);
-                        for &v in &self.order[self.starts[cell]..self.starts[cell + 1]] {
-                            let far = (self.points[v as usize] - p).norm_squared();
-                            if best.is_none_or(|(least, _)| far < least) {
-                                best = Some((far, v));
-                            }
-                        }
-                    }
-                }
-            }
-            if best.is_some() {
-                break;
-            }
-        }
-        best.map(|(_, v)| v as usize)
-    }
 }

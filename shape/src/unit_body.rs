@@ -191,7 +191,8 @@ impl UnitBody {
         match &self.inner.form {
             Form::Sphere => Some(Chord::of_ball(0.5, from, direction)),
             Form::Ellipsoid { axes } => {
-                let (from, along) = (from.component_div(axes), direction.component_div(axes));
+                let per_axis = axes.map(f64::recip);
+                let (from, along) = (from.component_mul(&per_axis), direction.component_mul(&per_axis));
                 Some(Chord::of_ball(1.0, &from, &along))
             }
             Form::Polytope { half_spaces, .. } => {

@@ -247,14 +247,17 @@ impl Cells {
         let body = &bodies[placed.shape];
         let offset = |x: f64| Vector3::new(x, row.y, row.z) - image.centre.coords;
         let beside = offset(image.centre.x);
-        let half = (image.outer_squared - beside.norm_squared()).sqrt();
-        // Not a number if the row passes the particle by.
-        if half.is_nan() {
+        let room = image.outer_squared - beside.norm_squared();
+        if room < 0.0 {
+            // The row passes the particle by.
             return;
         }
         // Along x, from the place beside the centre on.
         let chord = body.chord(&placed.local(&beside), &placed.to_local.column(0).into_owned());
-        let (sure, possible) = chord.map_or(([0.0; 2], [-half, half]), |chord| (chord.sure, chord.possible));
+        let (sure, possible) = match chord {
+            Some(chord) => (chord.sure, chord.possible),
+            None => ([0.0; 2], [-room.sqrt(), room.sqrt()]),
+        };
         let [from, end] = possible.map(|end| row.count_to(image.centre.x + end, ids.len()));
         let along = |i: &usize| row.x(*i) - image.centre.x;
         let first = (from..end).find(|i| along(i) > sure[0]).unwrap_or(end);

@@ -6,7 +6,6 @@ use crate::zarr::shard::Shard;
 use crate::zarr::{CHUNK, CHUNKS, COARSE};
 use crate::{GridError, VolumeShape};
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// One resolution, and its slabs that are in no shard yet.
@@ -92,8 +91,7 @@ impl<T: Element> Level<T> {
         for (shard, file) in self.shards_of((self.z - 1) / CHUNK) {
             let parent = file.parent().unwrap_or(&self.folder);
             fs::create_dir_all(parent).map_err(GridError::io(parent))?;
-            let bytes = shard.packed(&self.band, &self.shape);
-            write_atomically(&file, |out| out.write_all(&bytes))?;
+            write_atomically(&file, |out| shard.write(&self.band, &self.shape, out))?;
         }
         Ok(())
     }
@@ -102,22 +100,29 @@ impl<T: Element> Level<T> {
     fn halved(&self) -> Vec<T> {
         let VolumeShape { ny, nx, channels, .. } = self.shape;
         let length = self.slab_length();
-        let slabs: Vec<&[T]> = self.band.chunks_exact(length).rev().take(2 - self.z % 2).collect();
+        let slabs = self.band.len() / length;
+        let last = &self.band[(slabs - (2 - self.z % 2)) * length..];
         let labels = channels == 1 && T::TIFF_SAMPLE == 1;
         let mut half = Vec::with_capacity(length.div_ceil(4));
-        let mut samples = Vec::with_capacity(8);
         for y in (0..ny).step_by(2) {
+            // The slab that came first has the first rows.
+            let rows: Vec<&[T]> = last
+                .chunks_exact(length)
+                .flat_map(|slab| slab.chunks_exact(nx * channels).skip(y).take(2))
+                .collect();
             for x in (0..nx).step_by(2) {
-                for c in 0..channels {
-                    samples.clear();
-                    // The slab that came first is the last of the two.
-                    for slab in slabs.iter().rev() {
-                        for v in y..(y + 2).min(ny) {
-                            samples.extend((x..(x + 2).min(nx)).map(|u| slab[(v * nx + u) * channels + c]));
-                        }
+                let across = if x + 1 < nx { 2 } else { 1 };
+                half.extend((x * channels..(x + 1) * channels).map(|from| match rows.as_slice() {
+                    rows if labels => rows[0][from],
+                    // Nearly everywhere: a number of samples that is known makes the mean quick.
+                    &[a, b, c, d] if across == 2 => {
+                        T::mean([a, b, c, d].map(|row| [row[from], row[from + channels]]).as_flattened())
                     }
-                    half.push(if labels { samples[0] } else { T::mean(&samples) });
-                }
+                    rows => {
+                        let samples = |k: usize| rows[k / across][from + k % across * channels];
+                        T::mean(&(0..rows.len() * across).map(samples).collect::<Vec<T>>())
+                    }
+                }));
             }
         }
         half

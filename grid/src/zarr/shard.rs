@@ -3,6 +3,8 @@
 use crate::VolumeShape;
 use crate::element::Element;
 use crate::zarr::CHUNK;
+use std::io::{self, Write};
+use std::ops::Range;
 
 /// Where a shard lies in its band of slabs.
 #[derive(Clone, Copy, Debug)]
@@ -17,32 +19,32 @@ pub(crate) struct Shard {
 const MISSING: u64 = u64::MAX;
 
 impl Shard {
-    /// The bytes of the shard, from the slabs of its band.
-    pub(crate) fn packed<T: Element>(&self, band: &[T], shape: &VolumeShape) -> Vec<u8> {
-        let VolumeShape { ny, nx, channels, .. } = *shape;
-        let slab = ny * nx * channels;
-        let mut out = Vec::new();
+    /// Writes the shard, from the slabs of its band.
+    pub(crate) fn write<T: Element>(&self, band: &[T], shape: &VolumeShape, out: &mut dyn Write) -> io::Result<()> {
+        let slab = shape.ny * shape.nx * shape.channels;
+        let mut written = 0;
         let mut index = Vec::new();
-        let mut chunk = vec![T::default(); channels * CHUNK.pow(3)];
+        let mut chunk = vec![T::default(); shape.channels * CHUNK.pow(3)];
+        let length = size_of_val(chunk.as_slice()) as u64;
         for [y, x] in self.places() {
-            if y >= ny || x >= nx {
+            if y >= shape.ny || x >= shape.nx {
                 index.extend([MISSING; 2]);
                 continue;
             }
             chunk.fill(T::default());
             for (z, slab) in band.chunks_exact(slab).enumerate() {
-                for (c, v, u) in voxels([y, x], shape) {
-                    chunk[((c * CHUNK + z) * CHUNK + v - y) * CHUNK + u - x] = slab[(v * nx + u) * channels + c];
+                for (inside, outside) in rows([y, x], z, shape) {
+                    let from = slab[outside..].iter().step_by(shape.channels);
+                    chunk[inside].iter_mut().zip(from).for_each(|(to, from)| *to = *from);
                 }
             }
-            let from = out.len();
-            T::write(&chunk, &mut out).expect("a vector takes all bytes");
-            index.extend([from as u64, (out.len() - from) as u64]);
+            T::write(&chunk, out)?;
+            index.extend([written, length]);
+            written += length;
         }
         let index: Vec<u8> = index.iter().flat_map(|word| word.to_le_bytes()).collect();
-        out.extend(&index);
-        out.extend(crc32c(&index).to_le_bytes());
-        out
+        out.write_all(&index)?;
+        out.write_all(&crc32c(&index).to_le_bytes())
     }
 
     /// Puts the samples of the shard into the slabs of its band; `None` if it is no shard of this shape.
@@ -53,8 +55,9 @@ impl Shard {
         for [y, x] in self.places().filter(|&[y, x]| y < ny && x < nx) {
             let chunk = T::decode(chunks.next()?);
             for (z, slab) in slabs.iter_mut().enumerate() {
-                for (c, v, u) in voxels([y, x], shape) {
-                    slab[(v * nx + u) * channels + c] = chunk[((c * CHUNK + z) * CHUNK + v - y) * CHUNK + u - x];
+                for (inside, outside) in rows([y, x], z, shape) {
+                    let to = slab[outside..].iter_mut().step_by(channels);
+                    to.zip(&chunk[inside]).for_each(|(to, from)| *to = *from);
                 }
             }
         }
@@ -71,11 +74,16 @@ impl Shard {
     }
 }
 
-/// Channels and voxels (y, x) of a chunk that lie in the array.
-fn voxels([y, x]: [usize; 2], shape: &VolumeShape) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
+/// The rows at one z of a chunk whose first voxel is (y, x), as far as they lie in the array: where a row lies in the chunk, and where in the slab it begins.
+fn rows([y, x]: [usize; 2], z: usize, shape: &VolumeShape) -> impl Iterator<Item = (Range<usize>, usize)> + use<> {
     let VolumeShape { ny, nx, channels, .. } = *shape;
-    (0..channels)
-        .flat_map(move |c| (y..(y + CHUNK).min(ny)).flat_map(move |v| (x..(x + CHUNK).min(nx)).map(move |u| (c, v, u))))
+    let length = CHUNK.min(nx - x);
+    (0..channels).flat_map(move |c| {
+        (y..(y + CHUNK).min(ny)).map(move |v| {
+            let inside = ((c * CHUNK + z) * CHUNK + v - y) * CHUNK;
+            (inside..inside + length, (v * nx + x) * channels + c)
+        })
+    })
 }
 
 /// The checksum of the index: CRC-32 with Castagnoli's polynomial, reflected.
@@ -110,7 +118,9 @@ mod tests {
             let band: Vec<u32> = (0..u32::try_from(slab * depth).unwrap()).collect();
             let shard = Shard { chunks: [3, 3], from: [0, 0] };
             let mut slabs = vec![vec![0; slab]; depth];
-            shard.unpack(&shard.packed(&band, &shape), &shape, &mut slabs).unwrap();
+            let mut bytes = Vec::new();
+            shard.write(&band, &shape, &mut bytes).unwrap();
+            shard.unpack(&bytes, &shape, &mut slabs).unwrap();
             prop_assert_eq!(slabs.concat(), band);
         }
     }

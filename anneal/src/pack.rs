@@ -254,16 +254,10 @@ fn refuse_the_impossible(bodies: &[UnitBody], particles: &[Particle], period: &P
     }
 }
 
-/// The order in which a Z-curve through the box meets the particles (Morton 1966).
+/// The order in which a Z-curve through the box meets the particles.
 fn along_a_curve(particles: &[Particle], period: &PeriodicBox) -> Vec<usize> {
-    const CELLS: f64 = 1024.0;
-    let spread = |cell: u64| (0..10).fold(0, |sum, bit| sum | (cell >> bit & 1) << (3 * bit));
-    let key = |particle: &Particle| {
-        let at = period.wrap(&particle.position).coords.component_div(&period.sides()) * CELLS;
-        let [x, y, z] = [at.x, at.y, at.z].map(|x| spread(x as u64));
-        x | y << 1 | z << 2
-    };
-    let mut order: Vec<(u64, usize)> = particles.iter().map(key).zip(0..).collect();
+    let place = |particle: &Particle| period.curve_place(&particle.position);
+    let mut order: Vec<(u32, usize)> = particles.iter().map(place).zip(0..).collect();
     order.sort_unstable();
     order.into_iter().map(|(_, i)| i).collect()
 }

@@ -6,6 +6,7 @@
 
 mod packing;
 mod section_law;
+mod solids;
 mod textures;
 
 use std::path::{Path, PathBuf};
@@ -19,10 +20,11 @@ use serde_json::Value;
 type Measure = fn(&Bench) -> Result<Section>;
 
 /// What is measured, in the order of the report.
-const SECTIONS: [(&str, Measure); 3] = [
+const SECTIONS: [(&str, Measure); 4] = [
     ("Section law", section_law::measure),
     ("Packing", packing::measure),
     ("Textures", textures::measure),
+    ("Solids", solids::measure),
 ];
 
 /// Our tasks against one peer's.

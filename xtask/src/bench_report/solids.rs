@@ -1,0 +1,180 @@
+//! Solids: points asked one by one, over numbers of particles, and voxels written beside what the disk takes for the same bytes.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Result;
+use nalgebra::{Point3, Vector3};
+use ndarray::Array4;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use stereology::grid::Format;
+use stereology::shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology::volume::{Channel, Residual, Solid};
+
+use super::{Bench, Row, Section};
+
+const SIDE: f64 = 128.0;
+const POINTS: usize = 1_000_000;
+const VOXELS: usize = 512;
+
+pub fn measure(bench: &Bench) -> Result<Section> {
+    let mut rows = Vec::new();
+    for along in [5, 10, 22, 46, 100] {
+        let solid = rocks(along)?;
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        let points: Vec<Point3<f64>> = (0..POINTS)
+            .map(|_| Point3::from(Vector3::from_fn(|_, _| SIDE * random.random::<f64>())))
+            .collect();
+        let (ours, _) = bench.time(3, || Ok(solid.colours_at(&points)))?;
+        rows.push(Row {
+            task: format!("a million colours at random points of {} rocks", along.pow(3)),
+            ours,
+            peer: None,
+            remark: format!("{:.1} million a second on one core", 1e-6 * POINTS as f64 / ours),
+        });
+    }
+    let folder = crate::root()?.join("target/bench-report");
+    fs::create_dir_all(&folder)?;
+    let written = files(&folder);
+    fs::remove_dir_all(&folder)?;
+    rows.extend(written?);
+    Ok(Section {
+        words: format!(
+            "Rocks of two shapes, a fifth of them overlapping a little, in a box of {SIDE:.0} with a residual of as many voxels along it. Files: {VOXELS}³ voxels of \
+             10648 rocks; here seconds are those of the clock with all cores, the shortest of three, until the file is on the disk, and the peer is the disk: the \
+             same number of bytes that are there already. Not the disk but the cores set our pace: ten nanoseconds of a core a voxel in colour."
+        ),
+        peer: Ok("this disk".to_owned()),
+        rows,
+    })
+}
+
+/// Rocks on a lattice, shaken.
+fn rocks(along: u32) -> Result<Solid> {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let spacing = SIDE / f64::from(along);
+    let particles: Vec<Particle> = (0..along.pow(3))
+        .map(|i| Particle {
+            shape: i as usize % 2,
+            size: spacing * (0.8 + 0.25 * random.random::<f64>()),
+            category: 0,
+            position: Point3::from(
+                [i % along, i / along % along, i / along / along]
+                    .map(|k| (f64::from(k) + 0.3 * random.random::<f64>()) * spacing),
+            ),
+            orientation: isotropic_rotation(&mut random),
+        })
+        .collect();
+    let colours = particles
+        .iter()
+        .map(|_| [random.random(), random.random(), random.random()])
+        .collect();
+    let voxels = SIDE as usize;
+    let noise = Array4::from_shape_simple_fn((voxels, voxels, voxels, 3), || 0.1 * random.random::<f32>());
+    let residual = Residual {
+        binder: noise.clone(),
+        particles: noise,
+        voxel: 1.0,
+    };
+    let bodies = [1, 2].map(|seed| UnitBody::new(&Body::rock(seed))).to_vec();
+    let period = PeriodicBox::new(Vector3::repeat(SIDE))?;
+    Ok(Solid::new(
+        bodies,
+        particles,
+        colours,
+        period,
+        [0.5; 3],
+        Some(residual),
+    )?)
+}
+
+/// Voxels in formats of every kind: one file, pages, chunks with coarser levels, and ids.
+fn files(folder: &Path) -> Result<Vec<Row>> {
+    let solid = rocks(22)?;
+    let grid = solid.voxel_grid(VOXELS);
+    let mut rows = Vec::new();
+    for (channel, name, format, ending) in [
+        (Channel::Rgb, "colour", Format::Npy, "npy"),
+        (Channel::Rgb, "colour", Format::Tiff, "tif"),
+        (Channel::Rgb, "colour", Format::Zarr, "zarr"),
+        (Channel::Id, "ids", Format::Hdf5, "h5"),
+    ] {
+        let path = folder.join(format!("voxels.{ending}"));
+        let mut bytes = 0;
+        let ours = shortest(|| {
+            let go = |_: f64| ControlFlow::Continue(());
+            solid.write_voxels(&path, format, &grid, channel, &go)?;
+            bytes = synced(&path)?;
+            remove(&path)
+        })?;
+        let disk = shortest(|| {
+            write_plainly(&path, bytes)?;
+            remove(&path)
+        })?;
+        let megabytes = 1e-6 * bytes as f64;
+        rows.push(Row {
+            task: format!("{VOXELS}³ in {name}, .{ending}"),
+            ours,
+            peer: Some(disk),
+            remark: format!(
+                "{megabytes:.0} MB: {:.0} a second, the disk {:.0}; asked: 0.5×",
+                megabytes / ours,
+                megabytes / disk
+            ),
+        });
+    }
+    Ok(rows)
+}
+
+/// Seconds of the clock that the quickest of three runs took.
+fn shortest(mut task: impl FnMut() -> Result<()>) -> Result<f64> {
+    let mut best = f64::INFINITY;
+    for _ in 0..3 {
+        let start = Instant::now();
+        task()?;
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    Ok(best)
+}
+
+/// Bytes of a file, or of all files of a folder, when they are on the disk.
+fn synced(path: &Path) -> Result<u64> {
+    if !path.is_dir() {
+        let file = File::open(path)?;
+        file.sync_all()?;
+        return Ok(file.metadata()?.len());
+    }
+    let mut bytes = 0;
+    for entry in fs::read_dir(path)? {
+        bytes += synced(&entry?.path())?;
+    }
+    Ok(bytes)
+}
+
+fn remove(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        fs::remove_dir_all(path)?;
+    } else {
+        fs::remove_file(path)?;
+    }
+    Ok(())
+}
+
+/// So many bytes that no file system can make fewer of, until they are on the disk.
+fn write_plainly(path: &Path, bytes: u64) -> Result<()> {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let block: Vec<u8> = (0..1 << 20).map(|_| random.random()).collect();
+    let mut file = File::create(path)?;
+    let mut left = bytes;
+    while left > 0 {
+        let part = left.min(block.len() as u64);
+        file.write_all(&block[..part as usize])?;
+        left -= part;
+    }
+    file.sync_all()?;
+    Ok(())
+}

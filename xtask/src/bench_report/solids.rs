@@ -46,7 +46,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         words: format!(
             "Rocks of two shapes, a fifth of them overlapping a little, in a box of {SIDE:.0} with a residual of as many voxels along it. Files: {VOXELS}³ voxels of \
              10648 rocks; here seconds are those of the clock with all cores, the shortest of three, until the file is on the disk, and the peer is the disk: the \
-             same number of bytes that are there already. Not the disk but the cores set our pace: ten nanoseconds of a core a voxel in colour."
+             same number of bytes that are there already. Not the disk but the cores set our pace: some fifteen nanoseconds of a core a voxel in colour."
         ),
         peer: Ok("this disk".to_owned()),
         rows,

@@ -233,7 +233,7 @@ pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Arra
 /// marker stay 0.
 ///
 /// Ground between markers is divided where walks up the highest neighbour part; hills without a marker go to the neighbour across their highest saddle, saddles within 1/64 counting as equal (Cousty et al. 2009). A flood by a priority queue
-/// (Meyer 1994) divides the same ground up to single pixels of the borders, in n log n.
+/// (Meyer 1994) divides the same ground up to pixels of the borders and hills whose saddles count as equal, in n log n.
 ///
 /// # Complexity
 ///

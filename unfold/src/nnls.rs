@@ -153,6 +153,17 @@ mod tests {
         }
     }
 
+    /// With no column free, too, what leads away stays out.
+    #[test]
+    fn nothing_explains_what_is_not_positive() {
+        let a = DMatrix::from_element(3, 2, 1.0);
+        for b in [0.0, -1.0] {
+            let found = minimise(&a, &DVector::from_element(3, b));
+            assert!(found.converged);
+            assert_eq!(found.solution, DVector::zeros(2));
+        }
+    }
+
     proptest! {
         /// Kuhn-Tucker: nothing negative, no descent into the positive, no slope where positive.
         #[test]

@@ -129,7 +129,7 @@ impl Solid {
         let offsets: Vec<Vector3<f64>> = (0..n.pow(3))
             .map(|i| Vector3::new(along(i % n, 0), along(i / n % n, 1), along(i / n / n, 2)))
             .collect();
-        // Those of the first n offsets are those of all.
+        // Offsets differ along x among the first n only, and then repeat.
         let [nx, ..] = grid.counts;
         let places: Vec<_> = offsets[..n]
             .iter()

@@ -63,6 +63,14 @@ proptest! {
         prop_assert_eq!(solid.distance_at(&p), solid.distance_at(&moved));
     }
 
+    /// Many points are looked up in another order than they are given in.
+    #[test]
+    fn colours_come_in_the_order_of_their_points(seed in 0_u64..4, points in prop::collection::vec(point(), 0..200)) {
+        let solid = mixture(seed);
+        let one_by_one: Vec<[f32; 3]> = points.iter().map(|p| solid.colour_at(p)).collect();
+        prop_assert_eq!(solid.colours_at(&points), one_by_one);
+    }
+
     #[test]
     fn id_category_colour_and_distance_agree(seed in 0_u64..4, p in point()) {
         let solid = mixture(seed);

@@ -87,7 +87,7 @@ mod unit_body;
 mod winding;
 
 pub use body::{Body, BodyError, BodyKind};
-pub use chord::Chord;
+pub use chord::{Chord, Chords};
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};
 pub use coloured_mesh::ColouredMesh;
 #[cfg(feature = "io")]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, UnitVector3, Vector3, Vector4};
 
 use crate::body::{Body, BodyKind, mesh_profile_areas};
-use crate::chord::Chord;
+use crate::chord::Chords;
 use crate::closed_mesh::ClosedMesh;
 use crate::convex::{SupportMap, half_spaces};
 use crate::elliptic;
@@ -172,34 +172,36 @@ impl UnitBody {
         self.inner.contains(p)
     }
 
-    /// Where the line `origin + t direction` is inside, for balls, ellipsoids and convex bodies of few faces; `None` for others.
+    /// Where the lines `origin + s across + t along` of a plane are inside: to rounding for balls, ellipsoids and convex bodies of few faces; for others between the largest ball in the body and the smallest around it.
     ///
-    /// Cost: one product a face. A zero direction has no chord to speak of.
+    /// Cost: a square root a face, then one product a line and face that the plane meets. A zero `along` has no chord to speak of.
     ///
     /// ```
     /// use nalgebra::{Point3, Vector3};
     /// use stereology_shape::{Body, UnitBody};
     ///
     /// let ball = UnitBody::new(&Body::sphere(1.0)?);
-    /// let chord = ball.chord(&Point3::new(-2.0, 0.3, 0.0), &Vector3::x()).expect("balls have chords");
+    /// let chords = ball.chords(&Point3::new(-2.0, 0.0, 0.0), &Vector3::y(), &Vector3::x());
+    /// let chord = chords.at(0.3);
     /// assert!((chord.sure[0] - 1.6).abs() < 1e-8 && (chord.sure[1] - 2.4).abs() < 1e-8);
     /// # Ok::<(), stereology_shape::BodyError>(())
     /// ```
     #[must_use]
-    pub fn chord(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Chord> {
-        let from = &origin.coords;
+    pub fn chords(&self, origin: &Point3<f64>, across: &Vector3<f64>, along: &Vector3<f64>) -> Chords {
+        let origin = &origin.coords;
         match &self.inner.form {
-            Form::Sphere => Some(Chord::of_ball(0.5, from, direction)),
+            Form::Sphere => Chords::of_balls([0.5, 0.5], origin, across, along),
             Form::Ellipsoid { axes } => {
-                let per_axis = axes.map(f64::recip);
-                let (from, along) = (from.component_mul(&per_axis), direction.component_mul(&per_axis));
-                Some(Chord::of_ball(1.0, &from, &along))
+                let [origin, across, along] = [origin, across, along].map(|v| v.component_div(axes));
+                Chords::of_balls([1.0, 1.0], &origin, &across, &along)
             }
             Form::Polytope { half_spaces, .. } => {
-                let ball = Chord::of_ball(self.inner.bounding_radius, from, direction);
-                Some(ball.below(half_spaces, from, direction))
+                Chords::of_faces(self.inner.bounding_radius, half_spaces, origin, across, along)
             }
-            Form::Mesh { .. } => None,
+            Form::Mesh { .. } => {
+                let balls = [self.inner.inscribed_radius, self.inner.bounding_radius];
+                Chords::of_balls(balls, origin, across, along)
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::Solid;
 use crate::carve::{CarveError, check};
 use crate::charts::{Chart, Layout, MARGIN, Rectangle, charts, least_side};
-use crate::colour::{add, lanes, to_bytes};
+use crate::colour::{add, to_bytes};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -236,7 +236,7 @@ impl Oven<'_> {
         }
         let [(seen, count), (hollow, holes)] = sums;
         let (sum, of) = if count > 0 { (seen, count) } else { (hollow, holes) };
-        let [r, g, b] = to_bytes(lanes(sum.map(|c| c / f32::from(of))));
+        let [r, g, b] = to_bytes(sum.map(|c| c / f32::from(of)));
         #[allow(clippy::cast_possible_truncation, reason = "a share of 255")]
         let alpha = (f32::from(count) / f32::from(count + holes) * 255.0).round() as u8;
         [r, g, b, alpha]

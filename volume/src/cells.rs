@@ -5,7 +5,7 @@
     reason = "cells are fewer than 2^27, particles and their places checked by Solid::new"
 )]
 
-use crate::row::Row;
+use crate::strip::Images;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
@@ -29,6 +29,7 @@ pub(crate) struct Cells {
     /// `images[starts[cell]..starts[cell + 1]]` reach into the cell, lowest particle first.
     starts: Vec<u32>,
     images: Vec<Image>,
+    by_height: Images,
 }
 
 /// A particle, its motion inverted.
@@ -45,28 +46,18 @@ struct Placed {
 
 /// One of the periodic images of a particle.
 #[derive(Clone, Copy, Debug)]
-struct Image {
-    centre: Point3<f64>,
-    outer_squared: f64,
-    particle: u32,
+pub(crate) struct Image {
+    pub(crate) centre: Point3<f64>,
+    pub(crate) outer_squared: f64,
+    pub(crate) particle: u32,
 }
 
-/// The particle at each point of a row, or [`NONE`]; kept from row to row, as the next one mostly meets the same images.
-#[derive(Clone, Debug)]
-pub(crate) struct Marks {
-    pub(crate) ids: Vec<u32>,
-    /// The images near to a row of cells at a z.
-    near: Vec<Image>,
-    near_to: Option<(usize, f64)>,
-}
-
-impl Marks {
-    /// For rows of so many points.
-    pub(crate) fn new(points: usize) -> Self {
+impl Image {
+    pub(crate) fn new(centre: Point3<f64>, outer: f64, particle: u32) -> Self {
         Self {
-            ids: vec![NONE; points],
-            near: Vec::new(),
-            near_to: None,
+            centre,
+            outer_squared: outer * outer,
+            particle,
         }
     }
 }
@@ -85,10 +76,11 @@ impl Cells {
         let wanted = (CELLS_PER_PARTICLE * particles.len().max(1) as f64 / period.volume()).cbrt();
         let counts = [0, 1, 2].map(|k| (sides[k] * wanted).ceil().clamp(1.0, MOST_CELLS_PER_SIDE) as usize);
         let cells_per_length = Vector3::from_fn(|k, _| counts[k] as f64 / sides[k]);
-        let placed = particles
+        let placed: Vec<Placed> = particles
             .iter()
             .map(|particle| Placed::new(particle, &bodies[particle.shape]))
             .collect();
+        let by_height = Images::new(particles, |particle| placed[particle].outer, period);
         let total = counts.iter().product::<usize>();
         let mut cells = Self {
             sides,
@@ -98,6 +90,7 @@ impl Cells {
             owners: vec![NONE; total],
             starts: vec![0; total + 1],
             images: Vec::new(),
+            by_height,
         };
         let reached: Vec<Vec<(u32, Cover, Image)>> = particles
             .par_iter()
@@ -144,11 +137,7 @@ impl Cells {
                     };
                     let turns = Vector3::from_fn(|a, _| index_along[a].div_euclid(self.counts[a] as i64) as f64);
                     let cell = [0, 1, 2].map(|a| index_along[a].rem_euclid(self.counts[a] as i64) as usize);
-                    let image = Image {
-                        centre: centre - turns.component_mul(&self.sides),
-                        outer_squared: placed.outer * placed.outer,
-                        particle: index as u32,
-                    };
+                    let image = Image::new(centre - turns.component_mul(&self.sides), placed.outer, index as u32);
                     reached.push((self.number(cell) as u32, cover, image));
                 }
             }
@@ -165,11 +154,7 @@ impl Cells {
             self.starts[cell + 1] += self.starts[cell];
         }
         let mut next = self.starts.clone();
-        let nowhere = Image {
-            centre: Point3::origin(),
-            outer_squared: 0.0,
-            particle: 0,
-        };
+        let nowhere = Image::new(Point3::origin(), 0.0, 0);
         self.images = vec![nowhere; reached.iter().map(Vec::len).sum()];
         for &(cell, cover, image) in reached.iter().flatten() {
             let cell = cell as usize;
@@ -201,8 +186,7 @@ impl Cells {
         }
         let inside = |image: &&Image| {
             let offset = p - image.centre;
-            let placed = &self.placed[image.particle as usize];
-            offset.norm_squared() < image.outer_squared && bodies[placed.shape].contains(&placed.local(&offset))
+            offset.norm_squared() < image.outer_squared && self.holds(bodies, image.particle, &offset)
         };
         self.images_in(cell)
             .iter()
@@ -210,66 +194,21 @@ impl Cells {
             .map(|image| image.particle as usize)
     }
 
-    /// Marks the particle at each point of a row of the box: what [`Self::particle_at`] says, at the cost of a chord a particle.
-    pub(crate) fn particles_along(&self, bodies: &[UnitBody], row: &Row, marks: &mut Marks) {
-        marks.ids.fill(NONE);
-        let [_, j, k] = self.cell_of(&Point3::new(0.0, row.y, row.z));
-        if marks.near_to != Some((j, row.z)) {
-            marks.near_to = Some((j, row.z));
-            self.gather_near([j, k], row.z, &mut marks.near);
-        }
-        for image in &marks.near {
-            self.mark(bodies, image, row, &mut marks.ids);
-        }
+    /// Whether a particle holds the point at this offset from its centre.
+    pub(crate) fn holds(&self, bodies: &[UnitBody], particle: u32, offset: &Vector3<f64>) -> bool {
+        let placed = &self.placed[particle as usize];
+        bodies[placed.shape].contains(&placed.local(offset))
     }
 
-    /// The images that reach into a row of cells, and to a z there.
-    fn gather_near(&self, [j, k]: [usize; 2], z: f64, near: &mut Vec<Image>) {
-        near.clear();
-        let mut before: &[Image] = &[];
-        for i in 0..self.counts[0] {
-            let images = self.images_in(self.number([i, j, k]));
-            for image in images {
-                let up = z - image.centre.z;
-                let same = |other: &Image| other.particle == image.particle && other.centre == image.centre;
-                // An image that reaches in again farther on is marked twice, which does no harm.
-                if up * up < image.outer_squared && !before.iter().any(same) {
-                    near.push(*image);
-                }
-            }
-            before = images;
-        }
+    /// The shape of a particle, and what takes offsets from its centre to that shape.
+    pub(crate) fn placed(&self, particle: u32) -> (usize, &Matrix3<f64>) {
+        let placed = &self.placed[particle as usize];
+        (placed.shape, &placed.to_local)
     }
 
-    /// Marks the points of a row that are in one image of a particle, unless they are in one of lower index.
-    fn mark(&self, bodies: &[UnitBody], image: &Image, row: &Row, ids: &mut [u32]) {
-        let placed = &self.placed[image.particle as usize];
-        let body = &bodies[placed.shape];
-        let offset = |x: f64| Vector3::new(x, row.y, row.z) - image.centre.coords;
-        let beside = offset(image.centre.x);
-        let room = image.outer_squared - beside.norm_squared();
-        if room < 0.0 {
-            // The row passes the particle by.
-            return;
-        }
-        // Along x, from the place beside the centre on.
-        let chord = body.chord(&placed.local(&beside), &placed.to_local.column(0).into_owned());
-        let (sure, possible) = match chord {
-            Some(chord) => (chord.sure, chord.possible),
-            None => ([0.0; 2], [-room.sqrt(), room.sqrt()]),
-        };
-        let [from, end] = possible.map(|end| row.count_to(image.centre.x + end, ids.len()));
-        let along = |i: &usize| row.x(*i) - image.centre.x;
-        let first = (from..end).find(|i| along(i) > sure[0]).unwrap_or(end);
-        let last = (first..end).rfind(|i| along(i) < sure[1]).map_or(first, |i| i + 1);
-        let mut set = |i: usize| ids[i] = ids[i].min(image.particle);
-        (first..last).for_each(&mut set);
-        for i in (from..first).chain(last..end) {
-            let offset = offset(row.x(i));
-            if offset.norm_squared() < image.outer_squared && body.contains(&placed.local(&offset)) {
-                set(i);
-            }
-        }
+    /// All images, for rows of points.
+    pub(crate) fn images(&self) -> &Images {
+        &self.by_height
     }
 
     /// Signed distance from a point of the box to the nearest surface: to that of the particle it is in, negative; infinite without particles.

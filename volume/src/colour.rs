@@ -1,8 +1,12 @@
 //! Colours added up, and made bytes.
 
-#![allow(clippy::cast_possible_truncation, reason = "clamped to the range of u8")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the range of u8"
+)]
 
-use wide::f32x4;
+use wide::{f32x4, f32x8, i16x8, u8x16};
 
 /// Three channels and a fourth of no account, so that they are worked out at once.
 pub(crate) type Lanes = f32x4;
@@ -15,30 +19,76 @@ pub(crate) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// The only place where colours are clamped: encoded values to bytes, halves rounded up.
-pub(crate) fn to_bytes(colour: Lanes) -> [u8; 3] {
-    let value = colour * Lanes::splat(255.0);
-    // By comparison, so that what is no number becomes 0.
-    let value = value & value.simd_gt(Lanes::ZERO);
-    let value = value.simd_lt(Lanes::splat(255.0)).select(value, Lanes::splat(255.0));
-    let whole = Lanes::from_i32x4(value.fast_trunc_int());
-    let up = Lanes::ONE & (value - whole).simd_ge(Lanes::splat(0.5));
-    let [r, g, b, _] = (whole + up).fast_trunc_int().to_array();
-    [r as u8, g as u8, b as u8]
+/// The channels of four points side by side, each of the same colour.
+fn side_by_side([r, g, b]: [f32; 3]) -> [Lanes; 3] {
+    [[r, g, b, r], [g, b, r, g], [b, r, g, b]].map(Lanes::new)
+}
+
+/// Gives all points of a row one colour.
+pub(crate) fn fill_plain(colour: [f32; 3], row: &mut [f32]) {
+    row.as_chunks_mut().0.fill(colour);
+}
+
+/// Adds a colour to the details of a row.
+pub(crate) fn fill_with_detail(colour: [f32; 3], details: &[f32], row: &mut [f32]) {
+    let colours = side_by_side(colour);
+    let (fours, rest) = row.as_chunks_mut::<12>();
+    let (details, details_of_rest) = details.as_chunks::<12>();
+    for (four, details) in fours.iter_mut().zip(details) {
+        for (k, colour) in colours.iter().enumerate() {
+            let detail = Lanes::from(&details[4 * k..4 * k + 4]);
+            four[4 * k..4 * k + 4].copy_from_slice((*colour + detail).as_array());
+        }
+    }
+    for (one, detail) in rest.as_chunks_mut().0.iter_mut().zip(details_of_rest.as_chunks().0) {
+        *one = add(colour, *detail);
+    }
+}
+
+/// What is added before a byte is cut off: of it and any value whose fraction is a half the sum is rounded up to the next whole number, of any smaller value it stays below.
+const HALF: f32 = 0.5_f32.next_down();
+
+/// The only place where colours are clamped: encoded values to bytes, halves rounded up; what is no number becomes 0.
+pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
+    colour.map(|value| (value * 255.0 + HALF) as u8)
+}
+
+/// [`to_bytes`] of the channels of many points.
+pub(crate) fn row_to_bytes(row: &[f32], bytes: &mut [u8]) {
+    let clamped = |values: &[f32]| {
+        let value = f32x8::from(values) * f32x8::splat(255.0) + f32x8::splat(HALF);
+        // By comparison, so that what is no number becomes 0.
+        let value = value & value.simd_gt(f32x8::ZERO);
+        i16x8::from_i32x8_saturate(value.fast_min(f32x8::splat(255.0)).fast_trunc_int())
+    };
+    let (many, rest) = row.as_chunks::<16>();
+    let (bytes_of_many, bytes_of_rest) = bytes.as_chunks_mut::<16>();
+    for (values, bytes) in many.iter().zip(bytes_of_many) {
+        *bytes = u8x16::narrow_i16x8(clamped(&values[..8]), clamped(&values[8..])).to_array();
+    }
+    for (value, byte) in rest.iter().zip(bytes_of_rest) {
+        [*byte, ..] = to_bytes([*value; 3]);
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Lanes, to_bytes};
+    use super::{row_to_bytes, to_bytes};
 
-    /// Bytes are those of rounding halves up and clamping, at every half, beside it, beyond the ends and for what is no number.
+    /// Bytes are those of rounding halves up and clamping, at every half, beside it, beyond the ends and for what is no number, one by one and many at a time.
     #[test]
     fn bytes_are_rounded_and_clamped() {
         let halves = (-4..=520).map(|i| i as f32 / 510.0);
         let beside = halves.flat_map(|v| [v.next_down(), v, v.next_up()]);
-        for value in beside.chain([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, 1e30]) {
+        let values: Vec<f32> = beside
+            .chain([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, 1e30])
+            .collect();
+        let mut bytes = vec![1; values.len()];
+        row_to_bytes(&values, &mut bytes);
+        for (value, byte) in values.into_iter().zip(bytes) {
             let expected = (value * 255.0 + 0.0).clamp(0.0, 255.0).round() as u8;
-            assert_eq!(to_bytes(Lanes::splat(value)), [expected; 3], "{value}");
+            assert_eq!(to_bytes([value; 3]), [expected; 3], "{value}");
+            assert_eq!(byte, expected, "{value}");
         }
     }
 }

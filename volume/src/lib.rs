@@ -67,6 +67,7 @@ mod row;
 mod sections;
 mod slice;
 mod solid;
+mod strip;
 mod turned;
 mod voids;
 mod voxels;

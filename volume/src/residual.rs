@@ -5,9 +5,9 @@
     reason = "colours are f32; places are in the box and positive"
 )]
 
-use crate::colour::{Lanes, lanes};
+use crate::colour::{Lanes, fill_with_detail, lanes};
 use nalgebra::{Point3, Vector3};
-use ndarray::{Array4, ArrayView4};
+use ndarray::Array4;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -48,6 +48,10 @@ pub enum Lookup {
 }
 
 const MOST_GAIN: f32 = 8.0;
+/// Points that a row is longer than what is asked for.
+pub(crate) const SPARE_POINTS: usize = 4;
+/// Of the distance between two voxels.
+const AT_VOXEL: f64 = 1e-6;
 
 /// A repeating colour volume prepared for lookups.
 #[derive(Clone, Debug)]
@@ -55,8 +59,8 @@ pub(crate) struct Field {
     /// Voxels along x, y, z.
     sizes: [usize; 3],
     voxels_per_length: Vector3<f64>,
-    /// x fastest.
-    samples: Vec<[f32; 3]>,
+    /// Axes (z, y, x, 3).
+    samples: Vec<f32>,
     mean: Lanes,
     /// Autocovariance at lag (a, b, c) at index a + 2b + 4c, of each channel.
     covariance: [Lanes; 8],
@@ -64,9 +68,13 @@ pub(crate) struct Field {
 
 impl Field {
     /// Of an array (z, y, x, 3) of at least one voxel.
-    pub(crate) fn new(array: ArrayView4<'_, f32>, voxels_per_length: Vector3<f64>) -> Self {
+    pub(crate) fn new(array: Array4<f32>, voxels_per_length: Vector3<f64>) -> Self {
         let (nz, ny, nx, _) = array.dim();
-        let samples: Vec<[f32; 3]> = array.rows().into_iter().map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect();
+        let samples = if array.is_standard_layout() {
+            array.into_raw_vec_and_offset().0
+        } else {
+            array.iter().copied().collect()
+        };
         let mut field = Self {
             sizes: [nx, ny, nz],
             voxels_per_length,
@@ -81,7 +89,7 @@ impl Field {
     /// Mean and autocovariance, summed plane by plane in order.
     fn measure(&mut self) {
         let [nx, ny, nz] = self.sizes;
-        let row = |y: usize, z: usize| &self.samples[(z * ny + y) * nx..][..nx];
+        let row = |y: usize, z: usize| self.samples[3 * (z * ny + y) * nx..][..3 * nx].as_chunks::<3>().0;
         let average = |sum_of_row: &(dyn Fn(usize, usize) -> [f64; 3] + Sync)| {
             let plane = |z: usize| (0..ny).map(|y| sum_of_row(y, z)).fold([0.0; 3], plus);
             let planes: Vec<[f64; 3]> = (0..nz).into_par_iter().map(plane).collect();
@@ -137,39 +145,49 @@ impl Field {
     pub(crate) fn at(&self, p: &Point3<f64>, lookup: Lookup) -> [f32; 3] {
         let row = self.row([p.y, p.z], lookup);
         let Between { low, high, share } = self.between(0, p.x, lookup);
-        let ends = [low, high].map(|voxel| row.blend(voxel));
-        let [r, g, b, _] = row.between(ends, share, row.gain(share)).to_array();
+        let [low, high] = [low, high].map(|voxel| lanes(row.blend(voxel)));
+        let [r, g, b, _] = row.weights(share).mean(low, high).to_array();
         [r, g, b]
     }
 
-    /// Where points along x lie between the voxels, for [`FieldRow::ready_at`].
+    /// Where points along x lie between the voxels, for [`FieldRow::detail`].
     pub(crate) fn places(&self, points: impl Iterator<Item = f64>, lookup: Lookup) -> Places {
         let between: Vec<Between> = points.map(|x| self.between(0, x, lookup)).collect();
+        let n = self.sizes[0];
+        let voxels_themselves = between.iter().zip(between.iter().skip(1));
+        let voxels_themselves = between.iter().all(|place| place.share == 0.0)
+            && voxels_themselves.clone().all(|(a, b)| (a.low + 1) % n == b.low);
         let mut voxels: Vec<usize> = between.iter().flat_map(|place| [place.low, place.high]).collect();
         voxels.sort_unstable();
         voxels.dedup();
         let mut shares: Vec<f32> = between.iter().map(|place| place.share).collect();
         shares.sort_unstable_by(f32::total_cmp);
         shares.dedup();
-        let voxel = |v: usize| voxels.binary_search(&v).unwrap_or_else(|above| above) as u32;
+        let voxel = |v: usize| 3 * voxels.binary_search(&v).unwrap_or_else(|above| above) as u32;
         let place = |of: &Between| Place {
             low: voxel(of.low),
             high: voxel(of.high),
             share: shares.partition_point(|share| *share < of.share) as u32,
         };
-        let places = between.iter().map(place).collect();
-        Places { voxels, shares, places }
+        Places {
+            places: between.iter().map(place).collect(),
+            stretches: voxels
+                .chunk_by(|a, b| a + 1 == *b)
+                .map(|stretch| stretch[0]..stretch[0] + stretch.len())
+                .collect(),
+            shares,
+            first: between.first().filter(|_| voxels_themselves).map(|place| place.low),
+        }
     }
 
     /// The field along a row of the box.
     pub(crate) fn row(&self, yz: [f64; 2], lookup: Lookup) -> FieldRow<'_> {
         let [nx, ny, _] = self.sizes;
-        let start = |y: usize, z: usize| (z * ny + y) * nx;
+        let start = |y: usize, z: usize| 3 * (z * ny + y) * nx;
         let [y, z] = [0, 1].map(|k| self.between(k + 1, yz[k], lookup));
         let [ay, az] = [y, z].map(|of| 2.0 * of.share * (1.0 - of.share));
         let left = [(1.0 - ay) * (1.0 - az), ay * (1.0 - az), (1.0 - ay) * az, ay * az];
         let at_x = |a: usize| (0..4).fold(Lanes::ZERO, |sum, lag| sum + self.covariance[2 * lag + a] * left[lag]);
-        let at_voxels = at_x(0);
         FieldRow {
             field: self,
             starts: [
@@ -183,9 +201,9 @@ impl Field {
                 y.share * (1.0 - z.share),
                 (1.0 - y.share) * z.share,
                 y.share * z.share,
-            ]
-            .map(Lanes::splat),
-            variance: [at_voxels, at_x(1) - at_voxels],
+            ],
+            at_voxels: y.share == 0.0 && z.share == 0.0,
+            variance: [at_x(0), at_x(1) - at_x(0)],
             keeps_variance: lookup == Lookup::VarianceKept,
         }
     }
@@ -203,12 +221,18 @@ impl Field {
         }
         // Half a voxel off the centres, and a whole period on, so that it is positive.
         let place = x * self.voxels_per_length[axis] - 0.5 + n as f64;
-        let floor = place as usize;
+        let (mut floor, mut share) = (place as usize, place.fract());
+        // At a voxel to rounding is at the voxel.
+        if share < AT_VOXEL {
+            share = 0.0;
+        } else if share > 1.0 - AT_VOXEL {
+            (floor, share) = (floor + 1, 0.0);
+        }
         let low = floor % n;
         Between {
             low,
             high: if low + 1 == n { 0 } else { low + 1 },
-            share: (place - floor as f64) as f32,
+            share: share as f32,
         }
     }
 }
@@ -224,16 +248,18 @@ struct Between {
 /// Where the points of a row lie: what is worked out for a voxel or a share is so once, however many points have it. Grids that fit each other have few shares.
 #[derive(Clone, Debug)]
 pub(crate) struct Places {
-    /// The voxels that are read, ascending.
-    voxels: Vec<usize>,
+    /// The voxels that are read, ascending, those without a gap together.
+    stretches: Vec<Range<usize>>,
     /// The shares that occur, ascending.
     shares: Vec<f32>,
-    /// Of each point, places in the two lists.
+    /// Of each point, where its voxels begin among those that are read, and its share.
     places: Vec<Place>,
+    /// Where the points are the voxels, one after the other and again and again: the first of them.
+    first: Option<usize>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Place {
+pub(crate) struct Place {
     low: u32,
     high: u32,
     share: u32,
@@ -244,37 +270,98 @@ pub(crate) struct FieldRow<'a> {
     field: &'a Field,
     /// Where the rows of voxels around it begin, and their shares.
     starts: [usize; 4],
-    weights: [Lanes; 4],
+    weights: [f32; 4],
+    /// Whether the first of these rows has all the weight.
+    at_voxels: bool,
     /// What trilinear weights leave of the variance: at the voxels' x, and how it falls between them.
     variance: [Lanes; 2],
     keeps_variance: bool,
 }
 
+/// By what two voxels' values are multiplied and what is added to make the value between them, contrast restored.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Weights {
+    low: Lanes,
+    high: Lanes,
+    added: Lanes,
+}
+
+impl Weights {
+    fn mean(&self, low: Lanes, high: Lanes) -> Lanes {
+        (low * self.low + high * self.high) + self.added
+    }
+}
+
+/// Where a field along a row is worked out.
+#[derive(Debug, Default)]
+pub(crate) struct Details {
+    blended: Vec<f32>,
+    weights: Vec<Weights>,
+}
+
+/// A field along a row, at places.
+pub(crate) enum Detail<'a> {
+    /// The voxels of this row, from one on, again and again.
+    Voxels { row: &'a [f32], first: usize },
+    /// Between the voxels of a row.
+    Between {
+        blended: &'a [f32],
+        weights: &'a [Weights],
+        places: &'a [Place],
+    },
+}
+
 impl<'a> FieldRow<'a> {
-    /// The row, ready to be read at places: the same bits as [`Field::at`].
-    pub(crate) fn ready_at(self, places: &'a Places) -> ReadyRow<'a> {
-        ReadyRow {
-            blended: places.voxels.iter().map(|&voxel| self.blend(voxel)).collect(),
-            shares: places.shares.iter().map(|&share| (share, self.gain(share))).collect(),
+    /// The row at places: the same bits as [`Field::at`].
+    pub(crate) fn detail(&self, places: &'a Places, details: &'a mut Details) -> Detail<'a> {
+        let [nx, ..] = self.field.sizes;
+        let Details { blended, weights } = details;
+        let [a, b, c, d] = self.starts.map(|start| &self.field.samples[start..start + 3 * nx]);
+        if let (true, Some(first)) = (self.at_voxels, places.first) {
+            return Detail::Voxels { row: a, first };
+        }
+        blended.clear();
+        for stretch in &places.stretches {
+            let of = 3 * stretch.start..3 * stretch.end;
+            if self.at_voxels {
+                blended.extend_from_slice(&a[of]);
+                continue;
+            }
+            let fours = a[of.clone()].iter().zip(&b[of.clone()]).zip(&c[of.clone()]).zip(&d[of]);
+            blended.extend(fours.map(|(((a, b), c), d)| self.blended([*a, *b, *c, *d])));
+        }
+        // The last voxel is read with a fourth channel.
+        blended.push(0.0);
+        weights.clear();
+        weights.extend(places.shares.iter().map(|&share| self.weights(share)));
+        Detail::Between {
+            blended,
+            weights,
             places: &places.places,
-            row: self,
         }
     }
 
     /// The four rows at the x of a voxel.
-    fn blend(&self, voxel: usize) -> Lanes {
-        let [a, b, c, d] = self.starts.map(|start| lanes(self.field.samples[start + voxel]));
+    fn blend(&self, voxel: usize) -> [f32; 3] {
+        let values = |k: usize| self.starts.map(|start| self.field.samples[start + 3 * voxel + k]);
+        [0, 1, 2].map(|k| self.blended(values(k)))
+    }
+
+    fn blended(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let w = self.weights;
         (w[0] * a + w[1] * b) + (w[2] * c + w[3] * d)
     }
 
-    /// Between two blended voxels, contrast restored.
-    fn between(&self, [low, high]: [Lanes; 2], share: f32, gain: Lanes) -> Lanes {
-        let value = low * Lanes::splat(1.0 - share) + high * Lanes::splat(share);
-        if self.keeps_variance {
-            self.field.mean + (value - self.field.mean) * gain
+    fn weights(&self, share: f32) -> Weights {
+        let gain = if self.keeps_variance {
+            self.gain(share)
         } else {
-            value
+            Lanes::ONE
+        };
+        Weights {
+            low: Lanes::splat(1.0 - share) * gain,
+            high: Lanes::splat(share) * gain,
+            added: self.field.mean * (Lanes::ONE - gain),
         }
     }
 
@@ -290,23 +377,38 @@ impl<'a> FieldRow<'a> {
     }
 }
 
-/// A field along a row, read at places.
-pub(crate) struct ReadyRow<'a> {
-    row: FieldRow<'a>,
-    blended: Vec<Lanes>,
-    /// Each share with its gain.
-    shares: Vec<(f32, Lanes)>,
-    places: &'a [Place],
-}
-
-impl ReadyRow<'_> {
-    /// The field at points `of` the places, in their order.
-    pub(crate) fn values(&self, of: Range<usize>) -> impl Iterator<Item = Lanes> + '_ {
-        self.places[of].iter().map(|place| {
-            let ends = [place.low, place.high].map(|voxel| self.blended[voxel as usize]);
-            let (share, gain) = self.shares[place.share as usize];
-            self.row.between(ends, share, gain)
-        })
+impl Detail<'_> {
+    /// Writes a mean colour plus the detail at some of the points of a row; up to [`SPARE_POINTS`] after them are written over.
+    pub(crate) fn write(&self, points: Range<usize>, mean: [f32; 3], row: &mut [f32]) {
+        match self {
+            Self::Voxels { row: voxels, first } => {
+                let period = voxels.len() / 3;
+                let mut from = points.start;
+                while from < points.end {
+                    let voxel = (first + from) % period;
+                    let end = points.end.min(from + period - voxel);
+                    // Fours of points, as far as there are voxels, are quicker than an exact end.
+                    let exact = 3 * (end - from);
+                    let fours = exact.next_multiple_of(3 * SPARE_POINTS);
+                    let details = &voxels[3 * voxel..];
+                    let length = if fours > details.len() { exact } else { fours };
+                    fill_with_detail(mean, &details[..length], &mut row[3 * from..3 * from + length]);
+                    from = end;
+                }
+            }
+            Self::Between {
+                blended,
+                weights,
+                places,
+            } => {
+                let mean = lanes(mean);
+                let four = |at: u32| Lanes::from(&blended[at as usize..at as usize + 4]);
+                for (point, place) in points.clone().zip(&places[points]) {
+                    let detail = weights[place.share as usize].mean(four(place.low), four(place.high));
+                    row[3 * point..3 * point + 4].copy_from_slice((mean + detail).as_array());
+                }
+            }
+        }
     }
 }
 
@@ -333,7 +435,7 @@ mod tests {
     /// At a fixed place between the voxels, the variance over all voxels is that of the voxels themselves: an identity, not an estimate, where the field repeats.
     #[test]
     fn variance_is_kept_at_every_place_between_voxels() {
-        let field = Field::new(noise().view(), Vector3::repeat(1.0));
+        let field = Field::new(noise(), Vector3::repeat(1.0));
         for share in [[0.5, 0.5, 0.5], [0.2, 0.9, 0.6], [0.0, 0.5, 0.0], [0.7, 0.7, 0.1]] {
             let all = (0..16 * 16 * 16).map(|i| {
                 let voxel = [i % 16, i / 16 % 16, i / 256].map(f64::from);
@@ -354,7 +456,7 @@ mod tests {
     #[test]
     fn voxel_centres_show_the_voxels_whatever_the_lookup() {
         let array = noise();
-        let field = Field::new(array.view(), Vector3::repeat(2.0));
+        let field = Field::new(array.clone(), Vector3::repeat(2.0));
         for lookup in [Lookup::Nearest, Lookup::Trilinear, Lookup::VarianceKept] {
             for (z, y, x) in [(0, 0, 0), (15, 3, 7), (8, 15, 15)] {
                 let p = Point3::from([x, y, z].map(|i: usize| (i as f64 + 0.5) / 2.0));

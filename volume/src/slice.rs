@@ -5,7 +5,7 @@
     reason = "ids are checked against 2^31 by Solid::new; sample counts are clamped"
 )]
 
-use crate::colour::{add, lanes, to_bytes};
+use crate::colour::{add, to_bytes};
 use crate::solid::Solid;
 use crate::{Axis, SolidError};
 use image::RgbImage;
@@ -139,7 +139,7 @@ impl Solid {
                 let left = column as f64 * pixel;
                 let corners = [above[column], above[column + 1], below[column], below[column + 1]];
                 let colour = self.pixel_colour(plane, [left, top], pixel, &corners);
-                place.copy_from_slice(&to_bytes(lanes(colour)));
+                place.copy_from_slice(&to_bytes(colour));
             }
         });
         Ok(picture)

@@ -1,12 +1,12 @@
 //! The solid: what is at a point of a material that repeats.
 
-use crate::cells::{Cells, Marks};
+use crate::cells::Cells;
 use crate::colour::add;
 use crate::residual::{Field, Lookup, Residual};
-use crate::row::Row;
+use crate::strip::Strip;
 use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
-use ndarray::ArrayView4;
+use ndarray::Array4;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -207,7 +207,7 @@ impl Solid {
     ) -> Result<Self, SolidError> {
         check_particles(&bodies, &particles, &period)?;
         check_colours(&colours, &particles, binder)?;
-        let residual = residual.map(|residual| Fields::new(&residual, &period)).transpose()?;
+        let residual = residual.map(|residual| Fields::new(residual, &period)).transpose()?;
         let cells = Cells::new(&bodies, &particles, &period);
         Ok(Self {
             bodies: bodies.into(),
@@ -345,9 +345,9 @@ impl Solid {
         self.cells.particle_at(&self.bodies, p)
     }
 
-    /// The particle at each point of a row of the box, for [`index`](crate::row::index): the same as [`Self::id_within`] says.
-    pub(crate) fn ids_along(&self, row: &Row, marks: &mut Marks) {
-        self.cells.particles_along(&self.bodies, row, marks);
+    /// The particles that some rows meet.
+    pub(crate) fn strip(&self, z: f64, ys: [f64; 2]) -> Strip<'_> {
+        self.cells.strip(&self.bodies, z, ys)
     }
 
     /// The residuals of binder and particles.
@@ -450,9 +450,9 @@ fn check_colours(colours: &[[f32; 3]], particles: &[Particle], binder: [f32; 3])
 }
 
 impl Fields {
-    fn new(residual: &Residual, period: &PeriodicBox) -> Result<Self, SolidError> {
+    fn new(residual: Residual, period: &PeriodicBox) -> Result<Self, SolidError> {
         let voxel = residual.voxel;
-        let field = |part: &'static str, array: ArrayView4<'_, f32>| {
+        let field = |part: &'static str, array: Array4<f32>| {
             let (nz, ny, nx, channels) = array.dim();
             let wrong = SolidError::Residual {
                 part,
@@ -480,8 +480,8 @@ impl Fields {
             Ok(Field::new(array, voxels_per_length))
         };
         Ok(Self {
-            binder: field("binder", residual.binder.view())?,
-            particles: field("particles", residual.particles.view())?,
+            binder: field("binder", residual.binder)?,
+            particles: field("particles", residual.particles)?,
             voxel,
         })
     }

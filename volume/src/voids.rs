@@ -1,7 +1,7 @@
 //! Particles that are voids: the pores of a sponge, the bubbles of a foam.
 
-use crate::cells::{Cells, Marks, NONE};
-use crate::row::Row;
+use crate::cells::Cells;
+use crate::strip::Strip;
 use crate::{Solid, SolidError};
 use nalgebra::Point3;
 use std::sync::Arc;
@@ -75,12 +75,9 @@ impl Solid {
             .is_some_and(|voids| voids.cells.particle_at(self.bodies(), &p).is_some())
     }
 
-    /// The void at each point of a row of the box.
-    pub(crate) fn voids_along(&self, row: &Row, marks: &mut Marks) {
-        match &self.voids {
-            Some(voids) => voids.cells.particles_along(self.bodies(), row, marks),
-            None => marks.ids.fill(NONE),
-        }
+    /// The voids that some rows meet, none of a solid without.
+    pub(crate) fn strip_of_voids(&self, z: f64, ys: [f64; 2]) -> Option<Strip<'_>> {
+        self.voids.as_ref().map(|voids| voids.cells.strip(self.bodies(), z, ys))
     }
 
     /// Distance to the nearest surface of a void, negative in one; infinite without voids.

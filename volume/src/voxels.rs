@@ -6,16 +6,20 @@
 )]
 
 use crate::Solid;
-use crate::cells::Marks;
-use crate::colour::{Lanes, to_bytes};
-use crate::row::{Row, index};
+use crate::colour::row_to_bytes;
+use crate::row::{Row, RowColours};
+use crate::strip::{Runs, Strip};
 use nalgebra::{Point3, Vector3};
-use ndarray::{ArrayViewMut2, ArrayViewMut3, aview2};
+use ndarray::ArrayViewMut3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::slice::ChunksExactMut;
 use std::str::FromStr;
 use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
+
+/// Rows that are worked on together: enough to share what they meet, few enough to share among threads.
+const ROWS_AT_A_TIME: usize = 64;
 
 /// What a voxel says of the point at its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +86,11 @@ impl VoxelGrid {
         Point3::new(along(i, 0), along(j, 1), along(k, 2))
     }
 
+    /// Where so many rows of voxels begin and end.
+    fn ends_along_y(&self, first: usize, rows: usize) -> [f64; 2] {
+        [first, first + rows].map(|y| y as f64 * self.spacing[1])
+    }
+
     /// The points at this offset from the centres of a row of voxels.
     fn row(&self, y: usize, z: usize, offset: &Vector3<f64>) -> Row {
         let first = self.centre([0, y, z]) + offset;
@@ -135,50 +144,63 @@ impl Solid {
             .iter()
             .map(|offset| self.places_along(&grid.row(0, z, offset), nx))
             .collect();
-        let share = Lanes::splat(1.0 / offsets.len() as f32);
-        let buffers = || (Marks::new(nx), vec![Lanes::ZERO; nx], Vec::with_capacity(nx));
-        let fill = |(marks, sums, bytes): &mut (Marks, Vec<Lanes>, Vec<[u8; 3]>),
-                    (y, mut voxels): (usize, ArrayViewMut2<'_, u8>)| {
-            sums.fill(Lanes::ZERO);
-            for (offset, places) in offsets.iter().zip(places.iter().cycle()) {
-                let row = grid.row(y, z, offset);
-                self.ids_along(&row, marks);
-                self.add_colours_along(&row, &marks.ids, places.as_ref(), sums);
+        let share = 1.0 / offsets.len() as f32;
+        by_strips(&mut slab, |first, rows| {
+            let ys = grid.ends_along_y(first, rows.len());
+            let strip = |plane: &[Vector3<f64>]| self.strip(grid.row(0, z, &plane[0]).z, ys);
+            let strips: Vec<Strip<'_>> = offsets.chunks(n * n).map(strip).collect();
+            let (mut runs, mut into) = (Runs::new(nx), RowColours::new(nx));
+            let mut sums = Vec::new();
+            for (y, bytes) in (first..).zip(rows) {
+                sums.clear();
+                sums.resize(if n > 1 { 3 * nx } else { 0 }, 0.0);
+                for (i, offset) in offsets.iter().enumerate() {
+                    let row = grid.row(y, z, offset);
+                    strips[i / n / n].cut(&row, &mut runs);
+                    let colours = self.colours_along(&row, &runs, places[i % n].as_ref(), &mut into);
+                    if n == 1 {
+                        row_to_bytes(colours, bytes);
+                    } else {
+                        sums.iter_mut().zip(colours).for_each(|(sum, colour)| *sum += colour);
+                    }
+                }
+                if n > 1 {
+                    sums.iter_mut().for_each(|sum| *sum *= share);
+                    row_to_bytes(&sums, bytes);
+                }
             }
-            bytes.clear();
-            bytes.extend(sums.iter().map(|sum| to_bytes(*sum * share)));
-            voxels.assign(&aview2(bytes));
-        };
-        rows(&mut slab).into_par_iter().enumerate().for_each_init(buffers, fill);
+        });
     }
 
     /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
-        let ids = |row: &Row, marks: &mut Marks| self.ids_along(row, marks);
-        fill_by_id(grid, z, slab, ids, |id| id.map_or(0, |id| id as u32 + 1));
+        let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
+        fill_by_id(grid, z, slab, strip, |id| id.map_or(0, |id| id as u32 + 1));
     }
 
     /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
     pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        let ids = |row: &Row, marks: &mut Marks| self.ids_along(row, marks);
-        fill_by_id(grid, z, slab, ids, |id| {
+        let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
+        fill_by_id(grid, z, slab, strip, |id| {
             id.map_or(0, |id| self.particles()[id].category + 1)
         });
     }
 
     /// Fills the slab at `z` with signed distances.
     pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, f32>) {
-        rows(&mut slab).into_par_iter().enumerate().for_each(|(y, mut row)| {
-            for (x, voxel) in row.iter_mut().enumerate() {
-                *voxel = self.distance_at(&grid.centre([x, y, z])) as f32;
+        by_strips(&mut slab, |first, rows| {
+            for (y, row) in (first..).zip(rows) {
+                for (x, voxel) in row.iter_mut().enumerate() {
+                    *voxel = self.distance_at(&grid.centre([x, y, z])) as f32;
+                }
             }
         });
     }
 
     /// Fills the slab at `z` with 0 in voids, else 255.
     pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
-        let voids = |row: &Row, marks: &mut Marks| self.voids_along(row, marks);
-        fill_by_id(grid, z, slab, voids, |void| if void.is_some() { 0 } else { 255 });
+        let strip = |z: f64, ys: [f64; 2]| self.strip_of_voids(z, ys);
+        fill_by_id(grid, z, slab, strip, |void| if void.is_some() { 0 } else { 255 });
     }
 
     /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
@@ -290,24 +312,43 @@ impl VoxelFile<'_> {
     }
 }
 
-/// Asks `value` for every voxel of a slab, of the particle at its centre. The centres lie in the box: no wrapping is needed.
-fn fill_by_id<T: Send>(
+/// Asks `value` for the runs of every row of a slab. The centres lie in the box: no wrapping is needed.
+fn fill_by_id<'a, T: Element>(
     grid: &VoxelGrid,
     z: usize,
     mut slab: ArrayViewMut3<'_, T>,
-    mark: impl Fn(&Row, &mut Marks) + Sync,
+    strip: impl Fn(f64, [f64; 2]) -> Option<Strip<'a>> + Sync,
     value: impl Fn(Option<usize>) -> T + Sync,
 ) {
-    let buffer = || Marks::new(grid.counts[0]);
-    let fill = |marks: &mut Marks, (y, mut voxels): (usize, ArrayViewMut2<'_, T>)| {
-        mark(&grid.row(y, z, &Vector3::zeros()), marks);
-        for (voxel, &id) in voxels.iter_mut().zip(&marks.ids) {
-            *voxel = value(index(id));
+    by_strips(&mut slab, |first, rows| {
+        let row_at = |y: usize| grid.row(y, z, &Vector3::zeros());
+        let Some(strip) = strip(row_at(first).z, grid.ends_along_y(first, rows.len())) else {
+            rows.for_each(|row| row.fill(value(None)));
+            return;
+        };
+        let mut runs = Runs::new(grid.counts[0]);
+        for (y, row) in (first..).zip(rows) {
+            strip.cut(&row_at(y), &mut runs);
+            for (voxels, id) in runs.iter() {
+                row[voxels].fill(value(id));
+            }
         }
-    };
-    rows(&mut slab).into_par_iter().enumerate().for_each_init(buffer, fill);
+    });
 }
 
-fn rows<'a, T>(slab: &'a mut ArrayViewMut3<'_, T>) -> Vec<ArrayViewMut2<'a, T>> {
-    slab.outer_iter_mut().collect()
+/// Has the rows of a slab filled some at a time, shared among threads: `fill` gets the number of the first and the samples of each.
+fn by_strips<T: Element>(slab: &mut ArrayViewMut3<'_, T>, fill: impl Fn(usize, ChunksExactMut<'_, T>) + Sync) {
+    let (_, nx, channels) = slab.dim();
+    let row = nx * channels;
+    if slab.is_empty() {
+        return;
+    }
+    if let Some(samples) = slab.as_slice_mut() {
+        let strips = samples.par_chunks_mut(ROWS_AT_A_TIME * row).enumerate();
+        strips.for_each(|(i, strip)| fill(i * ROWS_AT_A_TIME, strip.chunks_exact_mut(row)));
+    } else {
+        let mut samples = slab.to_owned();
+        by_strips(&mut samples.view_mut(), fill);
+        slab.assign(&samples);
+    }
 }

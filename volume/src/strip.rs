@@ -1,0 +1,215 @@
+//! Which particle each point of a row is in: the chords of the particles that the row meets cut it into runs.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "a row has fewer than 2^32 points; images of a particle are few"
+)]
+
+use crate::cells::{Cells, Image, NONE};
+use crate::row::Row;
+use nalgebra::{Point3, Vector3};
+use std::ops::Range;
+use stereology_shape::{Chords, Particle, PeriodicBox, UnitBody};
+
+/// All images of the particles that reach into the box, by height.
+#[derive(Clone, Debug)]
+pub(crate) struct Images {
+    /// By the z of their centres, ascending.
+    images: Vec<Image>,
+    /// The largest radius.
+    reach: f64,
+}
+
+impl Images {
+    /// Of particles with these radii about their centres.
+    pub(crate) fn new(particles: &[Particle], outer: impl Fn(usize) -> f64, period: &PeriodicBox) -> Self {
+        let sides = period.sides();
+        let mut images = Vec::with_capacity(particles.len());
+        let mut reach = 0.0_f64;
+        for (index, particle) in (0..).zip(particles) {
+            let (home, radius) = (period.wrap(&particle.position), outer(index as usize));
+            reach = reach.max(radius);
+            let along = |k: usize| {
+                let turns = (radius / sides[k]).ceil() as i32;
+                (-turns..=turns)
+                    .map(move |turn| home[k] + f64::from(turn) * sides[k])
+                    .filter(move |x| x + radius > 0.0 && x - radius < sides[k])
+            };
+            for z in along(2) {
+                for y in along(1) {
+                    images.extend(along(0).map(|x| Image::new(Point3::new(x, y, z), radius, index)));
+                }
+            }
+        }
+        images.sort_by(|a, b| a.centre.z.total_cmp(&b.centre.z));
+        Self { images, reach }
+    }
+
+    /// Those that can hold a point at this z.
+    fn near(&self, z: f64) -> &[Image] {
+        let first = self.images.partition_point(|image| image.centre.z < z - self.reach);
+        let end = self.images.partition_point(|image| image.centre.z <= z + self.reach);
+        &self.images[first..end]
+    }
+}
+
+/// What rows at one z and neighbouring y meet.
+#[derive(Debug)]
+pub(crate) struct Strip<'a> {
+    cells: &'a Cells,
+    bodies: &'a [UnitBody],
+    sections: Vec<Section>,
+}
+
+/// A particle's image cut by the plane of the rows.
+#[derive(Debug)]
+struct Section {
+    image: Image,
+    /// Squared radius of the circle that its ball leaves on the plane.
+    circle: f64,
+    /// Of the lines along x, by their y from the image's centre, from the x of that centre on.
+    chords: Chords,
+}
+
+/// Points of a row that are in one particle, or in none.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    end: u32,
+    id: u32,
+}
+
+/// A row cut into runs.
+#[derive(Debug)]
+pub(crate) struct Runs {
+    points: u32,
+    runs: Vec<Run>,
+    spans: Vec<(Range<u32>, u32)>,
+    ids: Vec<u32>,
+}
+
+impl Cells {
+    /// What the rows at `z` and y from `ys[0]` to `ys[1]` meet.
+    pub(crate) fn strip<'a>(&'a self, bodies: &'a [UnitBody], z: f64, ys: [f64; 2]) -> Strip<'a> {
+        let circle = |image: &Image| image.outer_squared - (z - image.centre.z).powi(2);
+        let beside = |image: &Image| (ys[0] - image.centre.y).max(image.centre.y - ys[1]).max(0.0);
+        let near = self.images().near(z).iter();
+        let mut met: Vec<&Image> = near.filter(|image| beside(image).powi(2) < circle(image)).collect();
+        // So that runs come nearly in their order.
+        met.sort_unstable_by(|a, b| a.centre.x.total_cmp(&b.centre.x));
+        let section = |image: &Image| {
+            let (shape, to_local) = self.placed(image.particle);
+            let [along, across, up] = [0, 1, 2].map(|k| to_local.column(k).into_owned());
+            let middle = Point3::from((z - image.centre.z) * up);
+            Section {
+                image: *image,
+                circle: circle(image),
+                chords: bodies[shape].chords(&middle, &across, &along),
+            }
+        };
+        let sections = met.into_iter().map(section).collect();
+        Strip {
+            cells: self,
+            bodies,
+            sections,
+        }
+    }
+}
+
+impl Strip<'_> {
+    /// Cuts a row of it into runs: what [`Cells::particle_at`] says of every point, at the cost of a chord a particle.
+    pub(crate) fn cut(&self, row: &Row, runs: &mut Runs) {
+        runs.spans.clear();
+        for section in &self.sections {
+            let beside = row.y - section.image.centre.y;
+            if beside * beside < section.circle {
+                self.cut_out(section, row, runs);
+            }
+        }
+        runs.join();
+    }
+
+    /// The points of the row in one section.
+    fn cut_out(&self, section: &Section, row: &Row, runs: &mut Runs) {
+        let Image { centre, particle, .. } = section.image;
+        let chord = section.chords.at(row.y - centre.y);
+        let at = |ends: [f64; 2]| [centre.x + ends[0], centre.x + ends[1]];
+        let [possible, sure] = row.between(at(chord.possible), at(chord.sure), runs.points);
+        if !sure.is_empty() {
+            runs.spans.push((sure.clone(), particle));
+        }
+        if sure == possible {
+            return;
+        }
+        for i in (possible.start..sure.start).chain(sure.end..possible.end) {
+            let offset = Vector3::new(row.x(i), row.y, row.z) - centre.coords;
+            if offset.norm_squared() < section.image.outer_squared && self.cells.holds(self.bodies, particle, &offset) {
+                runs.spans.push((i..i + 1, particle));
+            }
+        }
+    }
+}
+
+impl Runs {
+    /// For rows of so many points.
+    pub(crate) fn new(points: usize) -> Self {
+        Self {
+            points: points as u32,
+            runs: Vec::new(),
+            spans: Vec::new(),
+            ids: Vec::new(),
+        }
+    }
+
+    /// The runs in their order, and the particle that each is in.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (Range<usize>, Option<usize>)> {
+        let mut from = 0;
+        self.runs.iter().map(move |run| {
+            let points = from..run.end as usize;
+            from = points.end;
+            (points, (run.id != NONE).then_some(run.id as usize))
+        })
+    }
+
+    /// Makes runs of the spans.
+    fn join(&mut self) {
+        self.runs.clear();
+        self.spans.sort_unstable_by_key(|(points, _)| points.start);
+        let mut end = 0;
+        for (points, id) in &self.spans {
+            if points.start < end {
+                return self.join_overlapping();
+            }
+            if points.start > end {
+                self.runs.push(Run {
+                    end: points.start,
+                    id: NONE,
+                });
+            }
+            end = points.end;
+            self.runs.push(Run { end, id: *id });
+        }
+        if end < self.points {
+            self.runs.push(Run {
+                end: self.points,
+                id: NONE,
+            });
+        }
+    }
+
+    /// Point by point: where particles overlap, the lowest index is seen.
+    fn join_overlapping(&mut self) {
+        self.ids.clear();
+        self.ids.resize(self.points as usize, NONE);
+        for (points, id) in &self.spans {
+            self.ids[points.start as usize..points.end as usize]
+                .iter_mut()
+                .for_each(|seen| *seen = (*seen).min(*id));
+        }
+        self.runs.clear();
+        let mut end = 0;
+        for same in self.ids.chunk_by(|a, b| a == b) {
+            end += same.len() as u32;
+            self.runs.push(Run { end, id: same[0] });
+        }
+    }
+}

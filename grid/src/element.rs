@@ -80,21 +80,19 @@ macro_rules! four_bytes {
             const CELLS: &'static str = $cells;
 
             fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()> {
-                let mut bytes = [0; 4 * 1024];
-                for block in samples.chunks(1024) {
-                    for (place, sample) in bytes.chunks_exact_mut(4).zip(block) {
-                        place.copy_from_slice(&sample.to_le_bytes());
+                let mut bytes = [[0; 4]; 4096];
+                for block in samples.chunks(4096) {
+                    for (place, sample) in bytes.iter_mut().zip(block) {
+                        *place = sample.to_le_bytes();
                     }
-                    out.write_all(&bytes[..4 * block.len()])?;
+                    out.write_all(bytes[..block.len()].as_flattened())?;
                 }
                 Ok(())
             }
 
             fn decode(bytes: &[u8]) -> Vec<Self> {
-                bytes
-                    .chunks_exact(4)
-                    .map(|b| <$type>::from_le_bytes([b[0], b[1], b[2], b[3]]))
-                    .collect()
+                let samples = bytes.as_chunks().0.iter();
+                samples.map(|sample| <$type>::from_le_bytes(*sample)).collect()
             }
 
             fn mean(samples: &[Self]) -> Self {

@@ -10,6 +10,8 @@ use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
+/// Bytes read at a time, a multiple of every sample's.
+const BLOCK: usize = 1 << 17;
 
 /// Header of a C-ordered volume, version 1.0, padded to a multiple of 64 bytes.
 pub(crate) fn header<T: Element>(shape: &VolumeShape) -> Vec<u8> {
@@ -57,7 +59,7 @@ pub fn read_npy<T: Element>(path: impl AsRef<Path>) -> Result<ArrayD<T>, GridErr
         path: path.to_owned(),
         reason,
     };
-    let (header, data) = read_bytes(path, wrong, |descr| {
+    let sample_size = |descr: &str| {
         if descr == T::NPY {
             return Ok(size_of::<T>());
         }
@@ -65,9 +67,12 @@ pub fn read_npy<T: Element>(path: impl AsRef<Path>) -> Result<ArrayD<T>, GridErr
             "holds samples of type {descr}, not {}; convert it with numpy's astype",
             T::NPY
         ))
-    })?;
+    };
+    let contents = Contents::open(path, wrong, sample_size)?;
+    let mut samples = Vec::with_capacity(contents.samples);
+    let header = contents.read(path, |bytes| samples.extend(T::decode(bytes)))?;
     let shape = IxDyn(&header.shape).set_f(header.fortran_order);
-    ArrayD::from_shape_vec(shape, T::decode(&data)).map_err(|_| wrong("changed while it was read".into()))
+    ArrayD::from_shape_vec(shape, samples).map_err(|_| wrong("changed while it was read".into()))
 }
 
 /// Reads a `.npy` file of any numbers.
@@ -81,40 +86,64 @@ pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), Gri
         SampleType::of_npy(descr)
             .ok_or_else(|| format!("holds samples of type {descr}; convert it with numpy's astype('f4')"))
     };
-    let (header, data) = read_bytes(path, wrong, |descr| kind_of(descr).map(|(kind, _)| kind.size()))?;
-    let (kind, big_endian) = kind_of(&header.descr).map_err(wrong)?;
+    let contents = Contents::open(path, wrong, |descr| kind_of(descr).map(|(kind, _)| kind.size()))?;
+    let (kind, big_endian) = kind_of(&contents.header.descr).map_err(wrong)?;
+    let mut samples = Vec::with_capacity(contents.samples);
+    let header = contents.read(path, |bytes| samples.extend(kind.decode(bytes, big_endian)))?;
     let shape = IxDyn(&header.shape).set_f(header.fortran_order);
-    let samples = ArrayD::from_shape_vec(shape, kind.decode(&data, big_endian));
+    let samples = ArrayD::from_shape_vec(shape, samples);
     Ok((samples.map_err(|_| wrong("changed while it was read".into()))?, kind))
 }
 
-/// The header and the bytes behind it; `sample_size` refuses a type or tells its bytes. The header is checked against the length of the file before memory is asked for.
-fn read_bytes(
-    path: &Path,
-    wrong: impl Fn(String) -> GridError,
-    sample_size: impl Fn(&str) -> Result<usize, String>,
-) -> Result<(Header, Vec<u8>), GridError> {
-    let file = File::open(path).map_err(GridError::io(path))?;
-    let length = file.metadata().map_err(GridError::io(path))?.len();
-    let mut reader = BufReader::new(file);
-    let header = Header::read(&mut reader)
-        .map_err(GridError::io(path))?
-        .map_err(&wrong)?;
-    let sample = sample_size(&header.descr).map_err(&wrong)? as u64;
-    let bytes = header
-        .shape
-        .iter()
-        .try_fold(sample, |bytes, &n| bytes.checked_mul(n as u64));
-    let held = length.saturating_sub(header.length);
-    if bytes != Some(held) {
-        return Err(wrong(format!(
-            "says {:?} samples of {sample} bytes but holds {held} bytes; it is damaged or cut off",
-            header.shape
-        )));
+/// An open file whose header fits its length.
+struct Contents {
+    header: Header,
+    reader: BufReader<File>,
+    samples: usize,
+    bytes: u64,
+}
+
+impl Contents {
+    /// `sample_size` refuses a type or tells its bytes. The header is checked against the length of the file, so that it cannot make us ask for more memory than that.
+    fn open(
+        path: &Path,
+        wrong: impl Fn(String) -> GridError,
+        sample_size: impl Fn(&str) -> Result<usize, String>,
+    ) -> Result<Self, GridError> {
+        let file = File::open(path).map_err(GridError::io(path))?;
+        let length = file.metadata().map_err(GridError::io(path))?.len();
+        let mut reader = BufReader::new(file);
+        let header = Header::read(&mut reader)
+            .map_err(GridError::io(path))?
+            .map_err(&wrong)?;
+        let sample = sample_size(&header.descr).map_err(&wrong)?;
+        let samples = header.shape.iter().try_fold(1_usize, |all, &n| all.checked_mul(n));
+        let bytes = length.saturating_sub(header.length);
+        match samples {
+            Some(samples) if samples.checked_mul(sample).map(|all| all as u64) == Some(bytes) => Ok(Self {
+                header,
+                reader,
+                samples,
+                bytes,
+            }),
+            _ => Err(wrong(format!(
+                "says {:?} samples of {sample} bytes but holds {bytes} bytes; it is damaged or cut off",
+                header.shape
+            ))),
+        }
     }
-    let mut data = Vec::new();
-    reader.read_to_end(&mut data).map_err(GridError::io(path))?;
-    Ok((header, data))
+
+    /// Hands over the bytes, block by block of whole samples: all at once would be a second copy of the file in memory.
+    fn read(mut self, path: &Path, mut take: impl FnMut(&[u8])) -> Result<Header, GridError> {
+        let mut block = vec![0; BLOCK];
+        while self.bytes > 0 {
+            let part = &mut block[..usize::try_from(self.bytes).map_or(BLOCK, |left| left.min(BLOCK))];
+            self.reader.read_exact(part).map_err(GridError::io(path))?;
+            take(part);
+            self.bytes -= part.len() as u64;
+        }
+        Ok(self.header)
+    }
 }
 
 struct Header {

@@ -125,7 +125,7 @@ impl Cells {
                     let cover = if distance + half_diagonal < placed.inner {
                         Cover::Whole
                     } else {
-                        let depth = placed.size * body.signed_distance(&placed.local(&offset));
+                        let depth = placed.size * body.signed_distance_bound(&placed.local(&offset));
                         if depth > half_diagonal {
                             continue;
                         }

@@ -58,6 +58,7 @@
 //! residual: between the voxels of white noise it keeps an eighth of the variance, see [`Lookup`].
 
 mod atlas;
+mod autocovariance;
 mod carve;
 mod cells;
 mod charts;

@@ -5,10 +5,10 @@
     reason = "colours are f32; places are in the box and positive"
 )]
 
+use crate::autocovariance::mean_and_autocovariance;
 use crate::colour::{Lanes, fill_with_detail, lanes};
 use nalgebra::{Point3, Vector3};
 use ndarray::Array4;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Fine detail to add to the mean colours: one volume for the binder, one for the particles (section 4.3).
@@ -75,70 +75,14 @@ impl Field {
         } else {
             array.iter().copied().collect()
         };
-        let mut field = Self {
+        let (mean, covariance) = mean_and_autocovariance(&samples, [nx, ny, nz]);
+        Self {
             sizes: [nx, ny, nz],
             voxels_per_length,
             samples,
-            mean: Lanes::ZERO,
-            covariance: [Lanes::ZERO; 8],
-        };
-        field.measure();
-        field
-    }
-
-    /// Mean and autocovariance, summed plane by plane in order.
-    fn measure(&mut self) {
-        let [nx, ny, nz] = self.sizes;
-        let row = |y: usize, z: usize| self.samples[3 * (z * ny + y) * nx..][..3 * nx].as_chunks::<3>().0;
-        let average = |sum_of_row: &(dyn Fn(usize, usize) -> [f64; 3] + Sync)| {
-            let plane = |z: usize| (0..ny).map(|y| sum_of_row(y, z)).fold([0.0; 3], plus);
-            let planes: Vec<[f64; 3]> = (0..nz).into_par_iter().map(plane).collect();
-            planes
-                .into_iter()
-                .fold([0.0; 3], plus)
-                .map(|sum| sum / (nx * ny * nz) as f64)
-        };
-        let mean = average(&|y, z| {
-            row(y, z)
-                .iter()
-                .fold([0.0; 3], |sum, rgb| plus(sum, rgb.map(f64::from)))
-        });
-        let lagged = |a: usize, b: usize, c: usize| {
-            average(&|y, z| {
-                let (here, there) = (row(y, z), row((y + b) % ny, (z + c) % nz));
-                let shifted = there[a % nx..].iter().chain(&there[..a % nx]);
-                here.iter().zip(shifted).fold([0.0; 3], |sum, (p, q)| {
-                    let product = |k: usize| (f64::from(p[k]) - mean[k]) * (f64::from(q[k]) - mean[k]);
-                    plus(sum, [product(0), product(1), product(2)])
-                })
-            })
-        };
-        let mut covariance = [Lanes::ZERO; 8];
-        for (index, average) in covariance.iter_mut().enumerate() {
-            let [a, b, c] = [index & 1, index >> 1 & 1, index >> 2 & 1];
-            // A lag and its opposite are the same; of the others every sign counts.
-            let signs = [
-                (b, c),
-                ((ny - b) % ny, c),
-                (b, (nz - c) % nz),
-                ((ny - b) % ny, (nz - c) % nz),
-            ];
-            let mut distinct = vec![signs[0]];
-            if a + b + c > 1 {
-                for sign in &signs[1..] {
-                    if !distinct.contains(sign) {
-                        distinct.push(*sign);
-                    }
-                }
-            }
-            if a == 0 {
-                distinct.truncate(2);
-            }
-            let sum = distinct.iter().map(|&(b, c)| lagged(a, b, c)).fold([0.0; 3], plus);
-            *average = lanes(sum.map(|sum| (sum / distinct.len() as f64) as f32));
+            mean: lanes(mean),
+            covariance: covariance.map(lanes),
         }
-        self.mean = lanes(mean.map(|mean| mean as f32));
-        self.covariance = covariance;
     }
 
     /// The field at a point of the box.
@@ -410,10 +354,6 @@ impl Detail<'_> {
             }
         }
     }
-}
-
-fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[cfg(test)]

@@ -323,7 +323,13 @@ pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
     }
     let file: SolidFile = read_json(&path)?;
     let packing_path = folder.join("packing.json");
-    let packing = PackingFile::read(&packing_path)?;
+    let texture_path = folder.join("texture.npy");
+    // Beside each other: either takes a while.
+    let (packing, residual) = rayon::join(
+        || PackingFile::read(&packing_path),
+        || read_texture(&texture_path, file.voxel),
+    );
+    let (packing, residual) = (packing?, residual?);
     let (particles, period) = packing
         .unpack()
         .map_err(|error| FileError::value(&packing_path, error))?;
@@ -339,7 +345,6 @@ pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
         })
         .collect::<Result<Vec<_>, BodyError>>()
         .map_err(|error| FileError::value(&packing_path, error))?;
-    let residual = read_texture(&folder.join("texture.npy"), file.voxel)?;
     let solid = Solid::new(bodies, particles, file.colours, period, file.binder, Some(residual))
         .and_then(|solid| solid.with_voids(&file.voids))
         .map_err(|error: SolidError| FileError::value(folder, error))?;
@@ -364,10 +369,18 @@ fn read_texture(path: &Path, voxel: f64) -> Result<Residual, FileError> {
         .ok()
         .filter(|array| array.dim().3 == 6)
         .ok_or_else(|| FileError::value(path, "not a residual volume: axes (z, y, x, 6) are expected"))?;
-    let channels = |from: usize| both.slice_axis(Axis(3), (from..from + 3).into()).to_owned();
+    let (nz, ny, nx, _) = both.dim();
+    let both = both.as_standard_layout();
+    let part = |from: usize| {
+        let voxels = both.as_slice().unwrap_or_default().as_chunks::<6>().0.iter();
+        let samples: Vec<[f32; 3]> = voxels.map(|both| [both[from], both[from + 1], both[from + 2]]).collect();
+        Array4::from_shape_vec((nz, ny, nx, 3), samples.into_flattened())
+    };
+    let (binder, particles) = rayon::join(|| part(0), || part(3));
+    let damaged = |error| FileError::value(path, error);
     Ok(Residual {
-        binder: channels(0),
-        particles: channels(3),
+        binder: binder.map_err(damaged)?,
+        particles: particles.map_err(damaged)?,
         voxel,
     })
 }

@@ -207,8 +207,11 @@ impl Solid {
     ) -> Result<Self, SolidError> {
         check_particles(&bodies, &particles, &period)?;
         check_colours(&colours, &particles, binder)?;
-        let residual = residual.map(|residual| Fields::new(residual, &period)).transpose()?;
-        let cells = Cells::new(&bodies, &particles, &period);
+        let (residual, cells) = rayon::join(
+            || residual.map(|residual| Fields::new(residual, &period)).transpose(),
+            || Cells::new(&bodies, &particles, &period),
+        );
+        let residual = residual?;
         Ok(Self {
             bodies: bodies.into(),
             particles: particles.into(),

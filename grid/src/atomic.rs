@@ -5,6 +5,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+/// Small writes are gathered; slabs are larger and go past the buffer.
+const BUFFER: usize = 1 << 16;
+
 /// Writes a file so that it appears under its name only when it is whole.
 ///
 /// `write` fills `FILE.partial` beside it, which is then renamed, replacing any file of that name. If `write` or the system fails, `FILE.partial` is removed and an older `FILE` stays as it was. A killed process may leave
@@ -79,7 +82,7 @@ impl PartialFile {
         Self {
             path: path.to_owned(),
             partial,
-            writer: Some(BufWriter::with_capacity(1 << 20, file)),
+            writer: Some(BufWriter::with_capacity(BUFFER, file)),
             keep,
         }
     }

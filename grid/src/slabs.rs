@@ -9,6 +9,8 @@ use std::fs;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::mpsc;
+use std::thread;
 
 /// Voxels along each axis and channels of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +50,7 @@ impl VolumeShape {
 
 /// Writes a volume whose slabs `fill` computes: `fill(z, slab)` is called for z = 0, 1, ..., nz − 1 with a view (y, x, channel) that holds zeros at first and whatever was left in it later.
 ///
-/// `spacing` is the size of a voxel along x, y, z in the unit of length of your choice; .npy has no place for it. Memory: one slab; for Zarr 32 slabs, and as many of each coarser resolution. The file appears under its name
+/// `spacing` is the size of a voxel along x, y, z in the unit of length of your choice; .npy has no place for it. One slab is written while the next is computed. Memory: two slabs; for Zarr 32 more, and as many of each coarser resolution. The file appears under its name
 /// when it is whole.
 ///
 /// # Errors
@@ -140,10 +142,10 @@ fn write<T: Element>(
     let frame = Frame::of::<T>(format, &shape, spacing, bytes);
     let around = frame.as_ref().map_or(0, Frame::length);
     refuse_without_room(path, bytes.saturating_add(around).saturating_sub(held))?;
-    let mut slabs = Slabs::new(shape, slab_bytes, fill)?;
+    let slabs = Slabs::new(shape, slab_bytes, fill)?;
     match frame {
-        None => zarr::write(path, &shape, spacing, resume, &mut slabs),
-        Some(frame) => write_framed(path, &frame, slab_bytes, resume, &mut slabs),
+        None => zarr::write(path, &shape, spacing, resume, slabs),
+        Some(frame) => write_framed(path, &frame, slab_bytes, resume, slabs),
     }
 }
 
@@ -151,17 +153,28 @@ fn write<T: Element>(
 pub(crate) struct Slabs<T, F> {
     shape: VolumeShape,
     slab: Vec<T>,
+    /// Filled while the other is written.
+    next: Vec<T>,
     fill: F,
 }
 
 impl<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>> Slabs<T, F> {
     fn new(shape: VolumeShape, bytes: u64, fill: F) -> Result<Self, GridError> {
         let samples = usize::try_from(bytes).map_err(|_| GridError::SlabTooLarge { bytes })? / size_of::<T>();
-        let mut slab = Vec::new();
-        slab.try_reserve_exact(samples)
-            .map_err(|_| GridError::SlabTooLarge { bytes })?;
-        slab.resize(samples, T::default());
-        Ok(Self { shape, slab, fill })
+        let slab = || {
+            let mut slab = Vec::new();
+            slab.try_reserve_exact(samples)
+                .map_err(|_| GridError::SlabTooLarge { bytes })?;
+            slab.resize(samples, T::default());
+            Ok(slab)
+        };
+        let (slab, next) = (slab()?, slab()?);
+        Ok(Self {
+            shape,
+            slab,
+            next,
+            fill,
+        })
     }
 
     /// The samples of the slab at z.
@@ -174,6 +187,48 @@ impl<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>> Slabs
             ControlFlow::Continue(()) => Ok(&self.slab),
         }
     }
+
+    /// Hands over the slabs from z = `first` on. `take` works on each while the next one is computed; it has had all that were computed when this returns.
+    pub(crate) fn each(
+        mut self,
+        path: &Path,
+        first: usize,
+        mut take: impl FnMut(&[T]) -> Result<(), GridError> + Send,
+    ) -> Result<(), GridError> {
+        let (full, filled) = mpsc::channel::<Vec<T>>();
+        let (empty, emptied) = mpsc::channel();
+        let mut next = Some(std::mem::take(&mut self.next));
+        let taking = move || {
+            for slab in filled {
+                take(&slab)?;
+                // Nobody waits for the last ones.
+                let _ = empty.send(slab);
+            }
+            Ok(())
+        };
+        thread::scope(|scope| {
+            let taker = thread::Builder::new()
+                .spawn_scoped(scope, taking)
+                .map_err(GridError::io(path))?;
+            let mut computed = Ok(());
+            for z in first..self.shape.nz {
+                if let Err(stopped) = self.at(z) {
+                    computed = Err(stopped);
+                    break;
+                }
+                // A taker that failed is gone, and says why itself.
+                let Some(empty) = next.take().or_else(|| emptied.recv().ok()) else {
+                    break;
+                };
+                if full.send(std::mem::replace(&mut self.slab, empty)).is_err() {
+                    break;
+                }
+            }
+            drop(full);
+            let taken = taker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            taken.and(computed)
+        })
+    }
 }
 
 fn write_framed<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
@@ -181,11 +236,11 @@ fn write_framed<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow
     frame: &Frame,
     slab_bytes: u64,
     resume: bool,
-    slabs: &mut Slabs<T, F>,
+    mut slabs: Slabs<T, F>,
 ) -> Result<(), GridError> {
     let (mut file, done) = if resume {
         let mut file = PartialFile::reopen(path)?;
-        let done = whole_slabs(path, &mut file, frame, slab_bytes, slabs)?;
+        let done = whole_slabs(path, &mut file, frame, slab_bytes, &mut slabs)?;
         (file, done)
     } else {
         (PartialFile::create(path)?, 0)
@@ -197,9 +252,7 @@ fn write_framed<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow
     } else {
         file.cut_to(frame.head.len() as u64 + done as u64 * slab_bytes)?;
     }
-    for z in done..slabs.shape.nz {
-        T::write(slabs.at(z)?, file.writer()).map_err(failed())?;
-    }
+    slabs.each(path, done, |slab| T::write(slab, file.writer()).map_err(failed()))?;
     file.writer().write_all(&frame.tail).map_err(failed())?;
     file.publish()
 }

@@ -30,14 +30,14 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
     shape: &VolumeShape,
     spacing: [f64; 3],
     resume: bool,
-    slabs: &mut Slabs<T, F>,
+    mut slabs: Slabs<T, F>,
 ) -> Result<(), GridError> {
     let folder = PartialFolder::open(path, resume)?;
     let mut levels = Level::<T>::all(&folder.partial, shape);
     let shapes: Vec<VolumeShape> = levels.iter().map(|level| level.shape).collect();
     let root = metadata::group(&shapes, shape, spacing);
     let done = if resume {
-        whole_slabs(&folder.partial, &root, &levels[0], slabs)?
+        whole_slabs(&folder.partial, &root, &levels[0], &mut slabs)?
     } else {
         0
     };
@@ -55,9 +55,7 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
             levels::push(&mut levels, &slab, false)?;
         }
     }
-    for z in done..shape.nz {
-        levels::push(&mut levels, slabs.at(z)?, true)?;
-    }
+    slabs.each(path, done, |slab| levels::push(&mut levels, slab, true))?;
     folder.publish()
 }
 

@@ -373,7 +373,9 @@ fn read_texture(path: &Path, voxel: f64) -> Result<Residual, FileError> {
     let both = both.as_standard_layout();
     let part = |from: usize| {
         let voxels = both.as_slice().unwrap_or_default().as_chunks::<6>().0.iter();
-        let samples: Vec<[f32; 3]> = voxels.map(|both| [both[from], both[from + 1], both[from + 2]]).collect();
+        let samples: Vec<[f32; 3]> = voxels
+            .map(|both| [both[from], both[from + 1], both[from + 2]])
+            .collect();
         Array4::from_shape_vec((nz, ny, nx, 3), samples.into_flattened())
     };
     let (binder, particles) = rayon::join(|| part(0), || part(3));

@@ -39,22 +39,37 @@ pub struct Chords {
     nearest: f64,
     spread: f64,
     per_square: f64,
-    /// Squared radii of the balls that hold all of the body, and nothing else (before the faces).
+    /// Squared radius of a ball that holds the body.
     outer: f64,
-    inner: f64,
-    /// Faces that end the body towards higher t, towards lower t, and those along which t runs.
+    /// What is surely inside, before the faces: the ball of this squared radius, or all of the other one.
+    inner: Option<f64>,
+    /// Faces that end the body towards higher t and towards lower t.
     ends: Vec<Face>,
     starts: Vec<Face>,
-    level: Vec<[f64; 2]>,
+    /// How far rounding may move them.
+    margin: f64,
+    /// Faces that the lines meet at a small angle, and those along which they run.
+    shallow: Vec<Shallow>,
 }
 
-/// Where the lines meet the plane of a face, as seen from their points nearest to the centre: t = at + turn s, to rounding ± margin.
+/// Where the lines meet the plane of a face, as seen from their points nearest to the centre: t = at + turn s.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     at: f64,
     turn: f64,
-    margin: f64,
 }
+
+/// A face by the height of the lines' points above it: height + climb s + slope t.
+#[derive(Clone, Copy, Debug)]
+struct Shallow {
+    height: f64,
+    climb: f64,
+    slope: f64,
+}
+
+/// Sines of the angles at which faces are met: below the first as if level, below the second with a margin of their own.
+const LEVEL: f64 = 1e-9;
+const SHALLOW: f64 = 1e-3;
 
 impl Chords {
     /// Of a body that lies in the ball of radius `outer` about the origin and holds the one of radius `inner`.
@@ -64,20 +79,10 @@ impl Chords {
         across: &Vector3<f64>,
         along: &Vector3<f64>,
     ) -> Self {
-        let plane = Plane::new(origin, across, along);
-        Self {
-            middle: plane.middle,
-            nearest_at: plane.nearest_at,
-            nearest: plane.nearest().norm_squared(),
-            spread: plane.across.norm_squared(),
-            per_square: plane.per_square,
-            outer: (outer + MARGIN).powi(2),
-            // Of no ball nothing is left.
-            inner: (inner - MARGIN).powi(2).copysign(inner - MARGIN),
-            ends: Vec::new(),
-            starts: Vec::new(),
-            level: Vec::new(),
-        }
+        let mut chords = Self::of_plane(&Plane::new(origin, across, along), outer);
+        // Of no ball nothing is sure: a negative square.
+        chords.inner = Some((inner - MARGIN).powi(2).copysign(inner - MARGIN));
+        chords
     }
 
     /// Of what is below the planes of the faces, all within the ball of radius `outer`.
@@ -88,43 +93,64 @@ impl Chords {
         across: &Vector3<f64>,
         along: &Vector3<f64>,
     ) -> Self {
-        let mut chords = Self::of_balls([outer, outer], origin, across, along);
         let plane = Plane::new(origin, across, along);
+        let mut chords = Self::of_plane(&plane, outer);
         let normal = across.cross(along).normalize();
         // The plane cuts a disc out of the ball, about this point of its normal.
         let depth = normal.dot(&plane.nearest());
-        let disc = (chords.outer - depth * depth).max(0.0).sqrt();
-        let level_slope = MARGIN * along.norm();
+        let disc = (chords.outer - depth * depth).max(0.0);
+        let per_length = along.norm().recip();
+        chords.ends.reserve(faces.len());
+        chords.starts.reserve(faces.len());
         for face in faces {
             let upright = face.xyz().dot(&normal);
             let height = upright * depth - face.w;
-            let reach = disc * (1.0 - upright * upright).max(0.0).sqrt();
-            if height + reach < -MARGIN {
-                // All of the disc is below the face.
+            // The disc reaches as far above and below its middle as the root of this.
+            let reach = disc * (1.0 - upright * upright);
+            let clear = height.abs() - MARGIN;
+            if clear > 0.0 && clear * clear > reach {
+                if height > 0.0 {
+                    // All of the disc is above the face.
+                    chords.outer = f64::NEG_INFINITY;
+                    break;
+                }
                 continue;
-            }
-            if height - reach > MARGIN {
-                chords.outer = -1.0;
-                break;
             }
             let slope = face.xyz().dot(along);
             let [height, climb] = [face.xyz().dot(&plane.origin) - face.w, face.xyz().dot(&plane.across)];
-            if slope.abs() <= level_slope {
-                chords.level.push([height, climb]);
+            if slope.abs() * per_length < SHALLOW {
+                chords.shallow.push(Shallow { height, climb, slope });
                 continue;
             }
+            let per_slope = slope.recip();
+            chords.margin = higher(chords.margin, MARGIN * per_slope.abs());
             let side = if slope > 0.0 {
                 &mut chords.ends
             } else {
                 &mut chords.starts
             };
             side.push(Face {
-                at: -height / slope,
-                turn: -climb / slope,
-                margin: MARGIN / slope.abs(),
+                at: -height * per_slope,
+                turn: -climb * per_slope,
             });
         }
         chords
+    }
+
+    fn of_plane(plane: &Plane, outer: f64) -> Self {
+        Self {
+            middle: plane.middle,
+            nearest_at: plane.nearest_at,
+            nearest: plane.nearest().norm_squared(),
+            spread: plane.across.norm_squared(),
+            per_square: plane.per_square,
+            outer: (outer + MARGIN).powi(2),
+            inner: None,
+            ends: Vec::new(),
+            starts: Vec::new(),
+            margin: 0.0,
+            shallow: Vec::new(),
+        }
     }
 
     /// The chord of one line.
@@ -134,36 +160,65 @@ impl Chords {
         let nearest = self.nearest + self.spread * off * off;
         // Not a number if the line misses the ball.
         let half = |square: f64| ((square - nearest) * self.per_square).sqrt();
-        let (sure, possible) = (half(self.inner), half(self.outer));
-        if possible.is_nan() {
+        let outer = half(self.outer);
+        if outer.is_nan() {
             return Chord::NONE;
         }
-        let mut possible = [-possible, possible];
-        let mut sure = if sure.is_nan() { NOWHERE } else { [-sure, sure] };
-        for face in &self.ends {
-            let at = face.at + face.turn * s;
-            sure[1] = lower(sure[1], at - face.margin);
-            possible[1] = lower(possible[1], at + face.margin);
-        }
-        for face in &self.starts {
-            let at = face.at + face.turn * s;
-            sure[0] = higher(sure[0], at + face.margin);
-            possible[0] = higher(possible[0], at - face.margin);
-        }
-        for [height, climb] in &self.level {
-            let height = height + climb * s;
-            // Along the chord it rises or falls by at most this much.
-            let margin = 2.0 * MARGIN * (1.0 + self.outer);
-            if height > margin {
-                return Chord::NONE;
-            } else if height > -margin {
-                sure = NOWHERE;
-            }
-        }
         let middle = self.middle[0] + self.middle[1] * s;
+        if let Some(square) = self.inner {
+            let inner = half(square);
+            return Chord {
+                sure: if inner.is_nan() {
+                    NOWHERE
+                } else {
+                    [middle - inner, middle + inner]
+                },
+                possible: [middle - outer, middle + outer],
+            };
+        }
+        let end = self
+            .ends
+            .iter()
+            .fold(outer, |end, face| lower(end, face.at + face.turn * s));
+        let start = self
+            .starts
+            .iter()
+            .fold(-outer, |start, face| higher(start, face.at + face.turn * s));
+        let mut chord = Chord {
+            sure: [start + self.margin, end - self.margin],
+            possible: [start - self.margin, end + self.margin],
+        };
+        for face in &self.shallow {
+            face.cut(s, outer, self.per_square, &mut chord);
+        }
         Chord {
-            sure: sure.map(|t| middle + t),
-            possible: possible.map(|t| middle + t),
+            sure: chord.sure.map(|t| middle + t),
+            possible: chord.possible.map(|t| middle + t),
+        }
+    }
+}
+
+impl Shallow {
+    /// Takes off a chord what the face cuts off; t is at most `outer`.
+    fn cut(&self, s: f64, outer: f64, per_square: f64, chord: &mut Chord) {
+        let height = self.height + self.climb * s;
+        if self.slope * self.slope * per_square < LEVEL * LEVEL {
+            // Along the chord it rises or falls by less than that.
+            let margin = MARGIN + self.slope.abs() * outer;
+            if height > margin {
+                *chord = Chord::NONE;
+            } else if height > -margin {
+                chord.sure = NOWHERE;
+            }
+            return;
+        }
+        let (at, margin) = (-height / self.slope, MARGIN / self.slope.abs());
+        if self.slope > 0.0 {
+            chord.sure[1] = lower(chord.sure[1], at - margin);
+            chord.possible[1] = lower(chord.possible[1], at + margin);
+        } else {
+            chord.sure[0] = higher(chord.sure[0], at + margin);
+            chord.possible[0] = higher(chord.possible[0], at - margin);
         }
     }
 }

@@ -135,7 +135,7 @@ impl Strip<'_> {
         let at = |ends: [f64; 2]| [centre.x + ends[0], centre.x + ends[1]];
         let [possible, sure] = row.between(at(chord.possible), at(chord.sure), runs.points);
         if !sure.is_empty() {
-            runs.spans.push((sure.clone(), particle));
+            runs.add(sure.clone(), particle);
         }
         if sure == possible {
             return;
@@ -143,7 +143,7 @@ impl Strip<'_> {
         for i in (possible.start..sure.start).chain(sure.end..possible.end) {
             let offset = Vector3::new(row.x(i), row.y, row.z) - centre.coords;
             if offset.norm_squared() < section.image.outer_squared && self.cells.holds(self.bodies, particle, &offset) {
-                runs.spans.push((i..i + 1, particle));
+                runs.add(i..i + 1, particle);
             }
         }
     }
@@ -170,10 +170,19 @@ impl Runs {
         })
     }
 
+    /// Puts a span into its place among the others, which is nearly always among the last.
+    fn add(&mut self, points: Range<u32>, id: u32) {
+        let mut place = self.spans.len();
+        self.spans.push((points, id));
+        while place > 0 && self.spans[place - 1].0.start > self.spans[place].0.start {
+            self.spans.swap(place - 1, place);
+            place -= 1;
+        }
+    }
+
     /// Makes runs of the spans.
     fn join(&mut self) {
         self.runs.clear();
-        self.spans.sort_unstable_by_key(|(points, _)| points.start);
         let mut end = 0;
         for (points, id) in &self.spans {
             if points.start < end {

@@ -59,10 +59,14 @@ impl Encoded for u8 {
         bytes.to_vec()
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "the mean of bytes is a byte")]
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "means of eight bytes at most")]
     fn mean(samples: &[Self]) -> Self {
-        let sum: usize = samples.iter().map(|&sample| usize::from(sample)).sum();
-        ((2 * sum + samples.len()) / (2 * samples.len()).max(1)) as Self
+        let (sum, all) = (
+            samples.iter().map(|&sample| u32::from(sample)).sum::<u32>(),
+            samples.len() as u32,
+        );
+        ((2 * sum + all) / (2 * all).max(1)) as Self
     }
 }
 
@@ -95,6 +99,7 @@ macro_rules! four_bytes {
                 samples.map(|sample| <$type>::from_le_bytes(*sample)).collect()
             }
 
+            #[inline]
             fn mean(samples: &[Self]) -> Self {
                 $mean(samples)
             }

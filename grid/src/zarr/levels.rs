@@ -110,23 +110,38 @@ impl<T: Element> Level<T> {
                 .chunks_exact(length)
                 .flat_map(|slab| slab.chunks_exact(nx * channels).skip(y).take(2))
                 .collect();
-            for x in (0..nx).step_by(2) {
-                let across = if x + 1 < nx { 2 } else { 1 };
-                half.extend((x * channels..(x + 1) * channels).map(|from| match rows.as_slice() {
-                    rows if labels => rows[0][from],
-                    // Nearly everywhere: a number of samples that is known makes the mean quick.
-                    &[a, b, c, d] if across == 2 => {
-                        T::mean([a, b, c, d].map(|row| [row[from], row[from + channels]]).as_flattened())
-                    }
-                    rows => {
-                        let samples = |k: usize| rows[k / across][from + k % across * channels];
-                        T::mean(&(0..rows.len() * across).map(samples).collect::<Vec<T>>())
-                    }
-                }));
+            match rows.as_slice() {
+                rows if labels => half.extend(rows[0].iter().step_by(2)),
+                // Nearly everywhere.
+                &[a, b, c, d] if nx % 2 == 0 && channels == 3 => half.extend(means::<T, 3>([a, b, c, d])),
+                &[a, b, c, d] if nx % 2 == 0 && channels == 1 => half.extend(means::<T, 1>([a, b, c, d])),
+                rows => half.extend((0..nx.div_ceil(2) * channels).map(|sample| {
+                    let from = sample / channels * 2 * channels + sample % channels;
+                    let columns = [from, from + channels].into_iter().filter(|&at| at < nx * channels);
+                    T::mean(
+                        &rows
+                            .iter()
+                            .flat_map(|row| columns.clone().map(|at| row[at]))
+                            .collect::<Vec<T>>(),
+                    )
+                })),
             }
         }
         half
     }
+}
+
+/// The means over two by two by two voxels of so many channels, from the four rows that they lie in.
+fn means<'a, T: Element, const CHANNELS: usize>(rows: [&'a [T]; 4]) -> impl Iterator<Item = T> + 'a {
+    let [a, b, c, d] = rows.map(|row| row.as_chunks::<CHANNELS>().0.as_chunks::<2>().0);
+    let pairs = a.iter().zip(b).zip(c).zip(d);
+    pairs.flat_map(|(((a, b), c), d)| {
+        let mut means = [T::default(); CHANNELS];
+        for (k, mean) in means.iter_mut().enumerate() {
+            *mean = T::mean(&[a[0][k], a[1][k], b[0][k], b[1][k], c[0][k], c[1][k], d[0][k], d[1][k]]);
+        }
+        means
+    })
 }
 
 /// Takes the next slab of the finest of `levels`; shards that are full are written if `write`.

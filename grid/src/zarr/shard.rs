@@ -33,9 +33,8 @@ impl Shard {
             }
             chunk.fill(T::default());
             for (z, slab) in band.chunks_exact(slab).enumerate() {
-                for (inside, outside) in rows([y, x], z, shape) {
-                    let from = slab[outside..].iter().step_by(shape.channels);
-                    chunk[inside].iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+                for row in rows([y, x], z, shape) {
+                    row.pick(slab, shape.channels, &mut chunk);
                 }
             }
             T::write(&chunk, out)?;
@@ -55,8 +54,8 @@ impl Shard {
         for [y, x] in self.places().filter(|&[y, x]| y < ny && x < nx) {
             let chunk = T::decode(chunks.next()?);
             for (z, slab) in slabs.iter_mut().enumerate() {
-                for (inside, outside) in rows([y, x], z, shape) {
-                    let to = slab[outside..].iter_mut().step_by(channels);
+                for Row { voxel, channel, inside } in rows([y, x], z, shape) {
+                    let to = slab[voxel * channels + channel..].iter_mut().step_by(channels);
                     to.zip(&chunk[inside]).for_each(|(to, from)| *to = *from);
                 }
             }
@@ -74,16 +73,45 @@ impl Shard {
     }
 }
 
-/// The rows at one z of a chunk whose first voxel is (y, x), as far as they lie in the array: where a row lies in the chunk, and where in the slab it begins.
-fn rows([y, x]: [usize; 2], z: usize, shape: &VolumeShape) -> impl Iterator<Item = (Range<usize>, usize)> + use<> {
+/// A row of one channel: its first voxel in the slab, and where it lies in the chunk.
+struct Row {
+    voxel: usize,
+    channel: usize,
+    inside: Range<usize>,
+}
+
+/// The rows at one z of a chunk whose first voxel is (y, x), as far as they lie in the array.
+fn rows([y, x]: [usize; 2], z: usize, shape: &VolumeShape) -> impl Iterator<Item = Row> + use<> {
     let VolumeShape { ny, nx, channels, .. } = *shape;
     let length = CHUNK.min(nx - x);
-    (0..channels).flat_map(move |c| {
-        (y..(y + CHUNK).min(ny)).map(move |v| {
-            let inside = ((c * CHUNK + z) * CHUNK + v - y) * CHUNK;
-            (inside..inside + length, (v * nx + x) * channels + c)
+    (y..(y + CHUNK).min(ny)).flat_map(move |v| {
+        (0..channels).map(move |channel| {
+            let from = ((channel * CHUNK + z) * CHUNK + v - y) * CHUNK;
+            Row {
+                voxel: v * nx + x,
+                channel,
+                inside: from..from + length,
+            }
         })
     })
+}
+
+impl Row {
+    /// Copies it from a slab of so many channels.
+    fn pick<T: Copy>(self, slab: &[T], channels: usize, chunk: &mut [T]) {
+        let to = &mut chunk[self.inside];
+        let from = &slab[self.voxel * channels..(self.voxel + to.len()) * channels];
+        match from.as_chunks::<3>() {
+            // As most often; known numbers are quick.
+            (voxels, []) if channels == 3 && self.channel < 3 => {
+                to.iter_mut().zip(voxels).for_each(|(to, rgb)| *to = rgb[self.channel]);
+            }
+            _ => {
+                let from = from[self.channel..].iter().step_by(channels);
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+            }
+        }
+    }
 }
 
 /// The checksum of the index: CRC-32 with Castagnoli's polynomial, reflected.

@@ -195,6 +195,7 @@ impl Cells {
     }
 
     /// Whether a particle holds the point at this offset from its centre.
+    #[inline]
     pub(crate) fn holds(&self, bodies: &[UnitBody], particle: u32, offset: &Vector3<f64>) -> bool {
         let placed = &self.placed[particle as usize];
         bodies[placed.shape].contains(&placed.local(offset))

@@ -89,7 +89,7 @@ impl Field {
     pub(crate) fn at(&self, p: &Point3<f64>, lookup: Lookup) -> [f32; 3] {
         let row = self.row([p.y, p.z], lookup);
         let Between { low, high, share } = self.between(0, p.x, lookup);
-        let [low, high] = [low, high].map(|voxel| lanes(row.blend(voxel)));
+        let [low, high] = [low, high].map(|voxel| row.blend(voxel));
         let [r, g, b, _] = row.weights(share).mean(low, high).to_array();
         [r, g, b]
     }
@@ -286,11 +286,17 @@ impl<'a> FieldRow<'a> {
     }
 
     /// The four rows at the x of a voxel.
-    fn blend(&self, voxel: usize) -> [f32; 3] {
-        let values = |k: usize| self.starts.map(|start| self.field.samples[start + 3 * voxel + k]);
-        [0, 1, 2].map(|k| self.blended(values(k)))
+    fn blend(&self, voxel: usize) -> Lanes {
+        let [a, b, c, d] = self.starts.map(|start| {
+            let from = start + 3 * voxel;
+            let samples = &self.field.samples[from..from + 3];
+            lanes([samples[0], samples[1], samples[2]])
+        });
+        let w = self.weights.map(Lanes::splat);
+        (w[0] * a + w[1] * b) + (w[2] * c + w[3] * d)
     }
 
+    /// One channel of [`Self::blend`].
     fn blended(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let w = self.weights;
         (w[0] * a + w[1] * b) + (w[2] * c + w[3] * d)

@@ -67,6 +67,19 @@ proptest! {
         }
     }
 
+    /// Never more than the distance, inside it exactly.
+    #[test]
+    fn bounds_are_below_the_distance(mesh in polytopes(), axes in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64], points in points(40..41)) {
+        let bodies = [unit(mesh), UnitBody::new(&Body::ellipsoid(axes).unwrap()), UnitBody::new(&Body::sphere(2.0).unwrap())];
+        for body in bodies.iter().chain(&HOLLOW[..1]) {
+            for p in &points {
+                let (bound, distance) = (body.signed_distance_bound(p), body.signed_distance(p));
+                prop_assert!(bound <= distance + 1e-12 && (bound > 0.0) == (distance > 0.0), "{bound} {distance}");
+                prop_assert!(distance > 0.0 || bound == distance);
+            }
+        }
+    }
+
     #[test]
     fn supports_touch_the_farthest_vertex(mesh in polytopes(), direction in directions()) {
         for body in [&unit(mesh), &HOLLOW[1], &FINE_SPHERE] {

@@ -73,6 +73,27 @@ fn a_folder_appears_whole_or_not_at_all() {
     assert!(thesis.join("thesis.tex").exists());
 }
 
+/// Slabs are written beside their computation: what stops the writing is told, and stops the computing too.
+#[test]
+fn what_cannot_be_written_ends_the_work() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("v.zarr");
+    let in_the_way = place.path().join("v.zarr.partial/0/c");
+    let shape = VolumeShape { nz: 1000, ..SHAPE };
+    let mut asked = 0;
+    let failed = write_volume::<u8>(&path, Format::Zarr, shape, [1.0; 3], |z, _| {
+        if z == 3 {
+            fs::write(&in_the_way, "a file where a folder is wanted").unwrap();
+        }
+        asked += 1;
+        ControlFlow::Continue(())
+    });
+    assert!(matches!(failed, Err(GridError::Io { .. })), "{failed:?}");
+    // The first shards are full with slab 31; one more may be done and one begun.
+    assert!(asked <= 34, "{asked}");
+    assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+}
+
 #[test]
 fn impossible_volumes_are_refused_before_a_file_is_made() {
     let folder = tempfile::tempdir().unwrap();

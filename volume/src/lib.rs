@@ -64,6 +64,7 @@ mod cells;
 mod charts;
 mod colour;
 mod residual;
+mod residual_row;
 mod row;
 mod sections;
 mod slice;

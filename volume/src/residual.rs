@@ -6,10 +6,9 @@
 )]
 
 use crate::autocovariance::mean_and_autocovariance;
-use crate::colour::{Lanes, fill_with_detail, lanes};
+use crate::colour::{Lanes, lanes};
 use nalgebra::{Point3, Vector3};
 use ndarray::Array4;
-use std::ops::Range;
 
 /// Fine detail to add to the mean colours: one volume for the binder, one for the particles (section 4.3).
 #[derive(Clone, Debug, PartialEq)]
@@ -48,8 +47,6 @@ pub enum Lookup {
 }
 
 const MOST_GAIN: f32 = 8.0;
-/// Points that a row is longer than what is asked for.
-pub(crate) const SPARE_POINTS: usize = 4;
 /// Of the distance between two voxels.
 const AT_VOXEL: f64 = 1e-6;
 
@@ -57,10 +54,10 @@ const AT_VOXEL: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub(crate) struct Field {
     /// Voxels along x, y, z.
-    sizes: [usize; 3],
+    pub(crate) sizes: [usize; 3],
     voxels_per_length: Vector3<f64>,
     /// Axes (z, y, x, 3).
-    samples: Vec<f32>,
+    pub(crate) samples: Vec<f32>,
     mean: Lanes,
     /// Autocovariance at lag (a, b, c) at index a + 2b + 4c, of each channel.
     covariance: [Lanes; 8],
@@ -94,36 +91,6 @@ impl Field {
         [r, g, b]
     }
 
-    /// Where points along x lie between the voxels, for [`FieldRow::detail`].
-    pub(crate) fn places(&self, points: impl Iterator<Item = f64>, lookup: Lookup) -> Places {
-        let between: Vec<Between> = points.map(|x| self.between(0, x, lookup)).collect();
-        let n = self.sizes[0];
-        let voxels_themselves = between.iter().zip(between.iter().skip(1));
-        let voxels_themselves = between.iter().all(|place| place.share == 0.0)
-            && voxels_themselves.clone().all(|(a, b)| (a.low + 1) % n == b.low);
-        let mut voxels: Vec<usize> = between.iter().flat_map(|place| [place.low, place.high]).collect();
-        voxels.sort_unstable();
-        voxels.dedup();
-        let mut shares: Vec<f32> = between.iter().map(|place| place.share).collect();
-        shares.sort_unstable_by(f32::total_cmp);
-        shares.dedup();
-        let voxel = |v: usize| 3 * voxels.binary_search(&v).unwrap_or_else(|above| above) as u32;
-        let place = |of: &Between| Place {
-            low: voxel(of.low),
-            high: voxel(of.high),
-            share: shares.partition_point(|share| *share < of.share) as u32,
-        };
-        Places {
-            places: between.iter().map(place).collect(),
-            stretches: voxels
-                .chunk_by(|a, b| a + 1 == *b)
-                .map(|stretch| stretch[0]..stretch[0] + stretch.len())
-                .collect(),
-            shares,
-            first: between.first().filter(|_| voxels_themselves).map(|place| place.low),
-        }
-    }
-
     /// The field along a row of the box.
     pub(crate) fn row(&self, yz: [f64; 2], lookup: Lookup) -> FieldRow<'_> {
         let [nx, ny, _] = self.sizes;
@@ -153,7 +120,7 @@ impl Field {
     }
 
     /// The voxels on both sides of a place along an axis; twice the one that holds it if the nearest is wanted.
-    fn between(&self, axis: usize, x: f64, lookup: Lookup) -> Between {
+    pub(crate) fn between(&self, axis: usize, x: f64, lookup: Lookup) -> Between {
         let n = self.sizes[axis];
         if lookup == Lookup::Nearest {
             let voxel = (x * self.voxels_per_length[axis]) as usize % n;
@@ -183,40 +150,20 @@ impl Field {
 
 /// Two neighbouring voxels and how near to the second.
 #[derive(Clone, Copy)]
-struct Between {
-    low: usize,
-    high: usize,
-    share: f32,
-}
-
-/// Where the points of a row lie: what is worked out for a voxel or a share is so once, however many points have it. Grids that fit each other have few shares.
-#[derive(Clone, Debug)]
-pub(crate) struct Places {
-    /// The voxels that are read, ascending, those without a gap together.
-    stretches: Vec<Range<usize>>,
-    /// The shares that occur, ascending.
-    shares: Vec<f32>,
-    /// Of each point, where its voxels begin among those that are read, and its share.
-    places: Vec<Place>,
-    /// Where the points are the voxels, one after the other and again and again: the first of them.
-    first: Option<usize>,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
-    low: u32,
-    high: u32,
-    share: u32,
+pub(crate) struct Between {
+    pub(crate) low: usize,
+    pub(crate) high: usize,
+    pub(crate) share: f32,
 }
 
 /// A field at one y and z.
 pub(crate) struct FieldRow<'a> {
-    field: &'a Field,
+    pub(crate) field: &'a Field,
     /// Where the rows of voxels around it begin, and their shares.
-    starts: [usize; 4],
+    pub(crate) starts: [usize; 4],
     weights: [f32; 4],
     /// Whether the first of these rows has all the weight.
-    at_voxels: bool,
+    pub(crate) at_voxels: bool,
     /// What trilinear weights leave of the variance: at the voxels' x, and how it falls between them.
     variance: [Lanes; 2],
     keeps_variance: bool,
@@ -231,60 +178,12 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    fn mean(&self, low: Lanes, high: Lanes) -> Lanes {
+    pub(crate) fn mean(&self, low: Lanes, high: Lanes) -> Lanes {
         (low * self.low + high * self.high) + self.added
     }
 }
 
-/// Where a field along a row is worked out.
-#[derive(Debug, Default)]
-pub(crate) struct Details {
-    blended: Vec<f32>,
-    weights: Vec<Weights>,
-}
-
-/// A field along a row, at places.
-pub(crate) enum Detail<'a> {
-    /// The voxels of this row, from one on, again and again.
-    Voxels { row: &'a [f32], first: usize },
-    /// Between the voxels of a row.
-    Between {
-        blended: &'a [f32],
-        weights: &'a [Weights],
-        places: &'a [Place],
-    },
-}
-
-impl<'a> FieldRow<'a> {
-    /// The row at places: the same bits as [`Field::at`].
-    pub(crate) fn detail(&self, places: &'a Places, details: &'a mut Details) -> Detail<'a> {
-        let [nx, ..] = self.field.sizes;
-        let Details { blended, weights } = details;
-        let [a, b, c, d] = self.starts.map(|start| &self.field.samples[start..start + 3 * nx]);
-        if let (true, Some(first)) = (self.at_voxels, places.first) {
-            return Detail::Voxels { row: a, first };
-        }
-        blended.clear();
-        for stretch in &places.stretches {
-            let of = 3 * stretch.start..3 * stretch.end;
-            if self.at_voxels {
-                blended.extend_from_slice(&a[of]);
-                continue;
-            }
-            let fours = a[of.clone()].iter().zip(&b[of.clone()]).zip(&c[of.clone()]).zip(&d[of]);
-            blended.extend(fours.map(|(((a, b), c), d)| self.blended([*a, *b, *c, *d])));
-        }
-        // The last voxel is read with a fourth channel.
-        blended.push(0.0);
-        weights.clear();
-        weights.extend(places.shares.iter().map(|&share| self.weights(share)));
-        Detail::Between {
-            blended,
-            weights,
-            places: &places.places,
-        }
-    }
-
+impl FieldRow<'_> {
     /// The four rows at the x of a voxel.
     fn blend(&self, voxel: usize) -> Lanes {
         let [a, b, c, d] = self.starts.map(|start| {
@@ -297,12 +196,12 @@ impl<'a> FieldRow<'a> {
     }
 
     /// One channel of [`Self::blend`].
-    fn blended(&self, [a, b, c, d]: [f32; 4]) -> f32 {
+    pub(crate) fn blended(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let w = self.weights;
         (w[0] * a + w[1] * b) + (w[2] * c + w[3] * d)
     }
 
-    fn weights(&self, share: f32) -> Weights {
+    pub(crate) fn weights(&self, share: f32) -> Weights {
         let gain = if self.keeps_variance {
             self.gain(share)
         } else {
@@ -324,41 +223,6 @@ impl<'a> FieldRow<'a> {
         let whole = whole.simd_gt(Lanes::ZERO).select(whole, Lanes::ONE);
         let least = whole * Lanes::splat(1.0 / MOST_GAIN);
         (whole / left.simd_gt(least).select(left, least)).sqrt()
-    }
-}
-
-impl Detail<'_> {
-    /// Writes a mean colour plus the detail at some of the points of a row; up to [`SPARE_POINTS`] after them are written over.
-    pub(crate) fn write(&self, points: Range<usize>, mean: [f32; 3], row: &mut [f32]) {
-        match self {
-            Self::Voxels { row: voxels, first } => {
-                let period = voxels.len() / 3;
-                let mut from = points.start;
-                while from < points.end {
-                    let voxel = (first + from) % period;
-                    let end = points.end.min(from + period - voxel);
-                    // Fours of points, as far as there are voxels, are quicker than an exact end.
-                    let exact = 3 * (end - from);
-                    let fours = exact.next_multiple_of(3 * SPARE_POINTS);
-                    let details = &voxels[3 * voxel..];
-                    let length = if fours > details.len() { exact } else { fours };
-                    fill_with_detail(mean, &details[..length], &mut row[3 * from..3 * from + length]);
-                    from = end;
-                }
-            }
-            Self::Between {
-                blended,
-                weights,
-                places,
-            } => {
-                let mean = lanes(mean);
-                let four = |at: u32| Lanes::from(&blended[at as usize..at as usize + 4]);
-                for (point, place) in points.clone().zip(&places[points]) {
-                    let detail = weights[place.share as usize].mean(four(place.low), four(place.high));
-                    row[3 * point..3 * point + 4].copy_from_slice((mean + detail).as_array());
-                }
-            }
-        }
     }
 }
 

@@ -7,7 +7,8 @@
 
 use crate::Solid;
 use crate::colour::fill_plain;
-use crate::residual::{Details, Field, Places, SPARE_POINTS};
+use crate::residual::Field;
+use crate::residual_row::{Details, Places, SPARE_POINTS};
 use crate::strip::Runs;
 use std::ops::Range;
 

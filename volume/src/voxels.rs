@@ -205,7 +205,7 @@ impl Solid {
 
     /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
     ///
-    /// `progress` is told the share that is done and may break off. Memory beside the solid: one slab.
+    /// `progress` is told the share that is done and may break off. Memory beside the solid: what the format needs, two slabs or some more ([`write_volume`]).
     ///
     /// # Errors
     ///

@@ -1,0 +1,149 @@
+//! The residual along rows of points: what is worked out for a voxel, or for a place between two, is so once.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "a row has fewer than 2^32 points and voxels"
+)]
+
+use crate::colour::{Lanes, fill_with_detail, lanes};
+use crate::residual::{Between, Field, FieldRow, Lookup, Weights};
+use std::ops::Range;
+
+/// Points that a row is longer than what is asked for.
+pub(crate) const SPARE_POINTS: usize = 4;
+
+/// Where the points of a row lie: what is worked out for a voxel or a share is so once, however many points have it. Grids that fit each other have few shares.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    /// The voxels that are read, ascending, those without a gap together.
+    stretches: Vec<Range<usize>>,
+    /// The shares that occur, ascending.
+    shares: Vec<f32>,
+    /// Of each point, where its voxels begin among those that are read, and its share.
+    places: Vec<Place>,
+    /// Where the points are the voxels, one after the other and again and again: the first of them.
+    first: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    low: u32,
+    high: u32,
+    share: u32,
+}
+
+/// Where a field along a row is worked out.
+#[derive(Debug, Default)]
+pub(crate) struct Details {
+    blended: Vec<f32>,
+    weights: Vec<Weights>,
+}
+
+/// A field along a row, at places.
+pub(crate) enum Detail<'a> {
+    /// The voxels of this row, from one on, again and again.
+    Voxels { row: &'a [f32], first: usize },
+    /// Between the voxels of a row.
+    Between {
+        blended: &'a [f32],
+        weights: &'a [Weights],
+        places: &'a [Place],
+    },
+}
+
+impl Field {
+    /// Where points along x lie between the voxels, for [`FieldRow::detail`].
+    pub(crate) fn places(&self, points: impl Iterator<Item = f64>, lookup: Lookup) -> Places {
+        let between: Vec<Between> = points.map(|x| self.between(0, x, lookup)).collect();
+        let [n, ..] = self.sizes;
+        let at_voxels = between.iter().all(|place| place.share == 0.0)
+            && between.windows(2).all(|pair| (pair[0].low + 1) % n == pair[1].low);
+        let mut voxels: Vec<usize> = between.iter().flat_map(|place| [place.low, place.high]).collect();
+        voxels.sort_unstable();
+        voxels.dedup();
+        let mut shares: Vec<f32> = between.iter().map(|place| place.share).collect();
+        shares.sort_unstable_by(f32::total_cmp);
+        shares.dedup();
+        let sample = |v: usize| 3 * voxels.partition_point(|voxel| *voxel < v) as u32;
+        let place = |of: &Between| Place {
+            low: sample(of.low),
+            high: sample(of.high),
+            share: shares.partition_point(|share| *share < of.share) as u32,
+        };
+        Places {
+            places: between.iter().map(place).collect(),
+            stretches: voxels
+                .chunk_by(|a, b| a + 1 == *b)
+                .map(|stretch| stretch[0]..stretch[0] + stretch.len())
+                .collect(),
+            shares,
+            first: between.first().filter(|_| at_voxels).map(|place| place.low),
+        }
+    }
+}
+
+impl<'a> FieldRow<'a> {
+    /// The row at places: the same bits as [`Field::at`].
+    pub(crate) fn detail(&self, places: &'a Places, details: &'a mut Details) -> Detail<'a> {
+        let [nx, ..] = self.field.sizes;
+        let Details { blended, weights } = details;
+        let [a, b, c, d] = self.starts.map(|start| &self.field.samples[start..start + 3 * nx]);
+        if let (true, Some(first)) = (self.at_voxels, places.first) {
+            return Detail::Voxels { row: a, first };
+        }
+        blended.clear();
+        for stretch in &places.stretches {
+            let of = 3 * stretch.start..3 * stretch.end;
+            if self.at_voxels {
+                blended.extend_from_slice(&a[of]);
+                continue;
+            }
+            let fours = a[of.clone()].iter().zip(&b[of.clone()]).zip(&c[of.clone()]).zip(&d[of]);
+            blended.extend(fours.map(|(((a, b), c), d)| self.blended([*a, *b, *c, *d])));
+        }
+        // The last voxel is read with a fourth channel.
+        blended.push(0.0);
+        weights.clear();
+        weights.extend(places.shares.iter().map(|&share| self.weights(share)));
+        Detail::Between {
+            blended,
+            weights,
+            places: &places.places,
+        }
+    }
+}
+
+impl Detail<'_> {
+    /// Writes a mean colour plus the detail at some of the points of a row; up to [`SPARE_POINTS`] after them are written over.
+    pub(crate) fn write(&self, points: Range<usize>, mean: [f32; 3], row: &mut [f32]) {
+        match self {
+            Self::Voxels { row: voxels, first } => {
+                let period = voxels.len() / 3;
+                let mut from = points.start;
+                while from < points.end {
+                    let voxel = (first + from) % period;
+                    let end = points.end.min(from + period - voxel);
+                    // Fours of points, as far as there are voxels, are quicker than an exact end.
+                    let exact = 3 * (end - from);
+                    let fours = exact.next_multiple_of(3 * SPARE_POINTS);
+                    let details = &voxels[3 * voxel..];
+                    let length = if fours > details.len() { exact } else { fours };
+                    fill_with_detail(mean, &details[..length], &mut row[3 * from..3 * from + length]);
+                    from = end;
+                }
+            }
+            Self::Between {
+                blended,
+                weights,
+                places,
+            } => {
+                let mean = lanes(mean);
+                let four = |at: u32| Lanes::from(&blended[at as usize..at as usize + 4]);
+                for (point, place) in points.clone().zip(&places[points]) {
+                    let detail = weights[place.share as usize].mean(four(place.low), four(place.high));
+                    row[3 * point..3 * point + 4].copy_from_slice((mean + detail).as_array());
+                }
+            }
+        }
+    }
+}

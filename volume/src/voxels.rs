@@ -10,7 +10,7 @@ use crate::colour::row_to_bytes;
 use crate::row::{Row, RowColours};
 use crate::strip::{Runs, Strip};
 use nalgebra::{Point3, Vector3};
-use ndarray::ArrayViewMut3;
+use ndarray::{Array3, ArrayViewMut3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -347,7 +347,7 @@ fn by_strips<T: Element>(slab: &mut ArrayViewMut3<'_, T>, fill: impl Fn(usize, C
         let strips = samples.par_chunks_mut(ROWS_AT_A_TIME * row).enumerate();
         strips.for_each(|(i, strip)| fill(i * ROWS_AT_A_TIME, strip.chunks_exact_mut(row)));
     } else {
-        let mut samples = slab.to_owned();
+        let mut samples = Array3::from_elem(slab.dim(), T::default());
         by_strips(&mut samples.view_mut(), fill);
         slab.assign(&samples);
     }

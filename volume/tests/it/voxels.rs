@@ -181,6 +181,19 @@ fn rows_of_voxels_are_their_points() {
     }
 }
 
+/// Slabs may lie in memory as they like, here with y as the fastest axis.
+#[test]
+fn slabs_may_have_any_strides() {
+    let solid = mixture(2);
+    let grid = solid.voxel_grid(32);
+    let [nx, ny, _] = grid.counts;
+    let (mut plain, mut strange) = (Array3::zeros((ny, nx, 3)), Array3::zeros((nx, ny, 3)));
+    solid.fill_rgb(&grid, 5, plain.view_mut());
+    solid.fill_rgb(&grid, 5, strange.view_mut().permuted_axes([1, 0, 2]));
+    assert!(plain.iter().any(|byte| *byte != plain[[0, 0, 0]]));
+    assert_eq!(strange.permuted_axes([1, 0, 2]), plain);
+}
+
 #[test]
 fn bytes_do_not_depend_on_threads() {
     let solid = mixture(3);

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Small writes are gathered; slabs are larger and go past the buffer.
+/// Small writes are gathered; larger ones, as of most slabs, go past the buffer.
 const BUFFER: usize = 1 << 16;
 
 /// Writes a file so that it appears under its name only when it is whole.

@@ -47,7 +47,7 @@ pub enum Lookup {
 }
 
 const MOST_GAIN: f32 = 8.0;
-/// Of the distance between two voxels.
+/// What is nearer to a voxel than this share of the distance between two is at the voxel: more than rounding, less than is seen.
 const AT_VOXEL: f64 = 1e-6;
 
 /// A repeating colour volume prepared for lookups.

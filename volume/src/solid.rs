@@ -192,7 +192,7 @@ impl Solid {
     /// Puts a solid together.
     ///
     /// `colours[i]` is the mean colour of particle i and `binder` that of the binder, sRGB-encoded values / 255; the residual, if any, is added to them: the binder's outside, the particles' inside.
-    /// Positions may lie outside the box. Cost: about 1 µs a cell of the search grid, 32 cells a particle.
+    /// Positions may lie outside the box. Cost: less than 1 µs a cell of the search grid, 32 cells a particle.
     ///
     /// # Errors
     ///

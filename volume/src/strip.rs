@@ -134,18 +134,18 @@ impl Strip<'_> {
         let chord = section.chords.at(row.y - centre.y);
         let at = |ends: [f64; 2]| [centre.x + ends[0], centre.x + ends[1]];
         let [possible, sure] = row.between(at(chord.possible), at(chord.sure), runs.points);
-        if !sure.is_empty() {
-            runs.add(sure.clone(), particle);
-        }
         if sure == possible {
+            runs.add(sure, particle);
             return;
         }
-        for i in (possible.start..sure.start).chain(sure.end..possible.end) {
-            let offset = Vector3::new(row.x(i), row.y, row.z) - centre.coords;
-            if offset.norm_squared() < section.image.outer_squared && self.cells.holds(self.bodies, particle, &offset) {
-                runs.add(i..i + 1, particle);
-            }
-        }
+        let inside = |i: &u32| {
+            let offset = Vector3::new(row.x(*i), row.y, row.z) - centre.coords;
+            offset.norm_squared() < section.image.outer_squared && self.cells.holds(self.bodies, particle, &offset)
+        };
+        let (before, after) = (possible.start..sure.start, sure.end..possible.end);
+        before.filter(inside).for_each(|i| runs.add(i..i + 1, particle));
+        runs.add(sure, particle);
+        after.filter(inside).for_each(|i| runs.add(i..i + 1, particle));
     }
 }
 
@@ -170,13 +170,15 @@ impl Runs {
         })
     }
 
-    /// Puts a span into its place among the others, which is nearly always among the last.
+    /// Puts a span into its place among the others, which is nearly always among the last; joins it to the one that it goes on with.
     fn add(&mut self, points: Range<u32>, id: u32) {
-        let mut place = self.spans.len();
-        self.spans.push((points, id));
-        while place > 0 && self.spans[place - 1].0.start > self.spans[place].0.start {
-            self.spans.swap(place - 1, place);
-            place -= 1;
+        if points.is_empty() {
+            return;
+        }
+        let before = self.spans.iter().rposition(|(other, _)| other.start <= points.start);
+        match before.map(|i| &mut self.spans[i]) {
+            Some((last, same)) if *same == id && last.end == points.start => last.end = points.end,
+            _ => self.spans.insert(before.map_or(0, |i| i + 1), (points, id)),
         }
     }
 

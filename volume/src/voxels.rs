@@ -132,6 +132,10 @@ impl Solid {
     /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, rows shared among threads.
     ///
     /// The colour of a voxel is the mean over `grid.samples`³ points spread evenly in it; 4³ leave steps of 1/64 at the borders of particles.
+    ///
+    /// # Panics
+    ///
+    /// If the slab has not the shape of `grid`.
     pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, u8>) {
         let n = grid.samples.max(1);
         let along = |i: usize, axis: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * grid.spacing[axis];
@@ -145,7 +149,7 @@ impl Solid {
             .map(|offset| self.places_along(&grid.row(0, z, offset), nx))
             .collect();
         let share = 1.0 / offsets.len() as f32;
-        by_strips(&mut slab, |first, rows| {
+        by_strips(grid, 3, &mut slab, |first, rows| {
             let ys = grid.ends_along_y(first, rows.len());
             let strip = |plane: &[Vector3<f64>]| self.strip(grid.row(0, z, &plane[0]).z, ys);
             let strips: Vec<Strip<'_>> = offsets.chunks(n * n).map(strip).collect();
@@ -173,12 +177,20 @@ impl Solid {
     }
 
     /// Fills the slab at `z` with ids: 0 in the binder, else index + 1.
+    ///
+    /// # Panics
+    ///
+    /// If the slab has not the shape of `grid`.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
         let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
         fill_by_id(grid, z, slab, strip, |id| id.map_or(0, |id| id as u32 + 1));
     }
 
     /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
+    ///
+    /// # Panics
+    ///
+    /// If the slab has not the shape of `grid`.
     pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
         let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
         fill_by_id(grid, z, slab, strip, |id| {
@@ -187,8 +199,12 @@ impl Solid {
     }
 
     /// Fills the slab at `z` with signed distances.
+    ///
+    /// # Panics
+    ///
+    /// If the slab has not the shape of `grid`.
     pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, f32>) {
-        by_strips(&mut slab, |first, rows| {
+        by_strips(grid, 1, &mut slab, |first, rows| {
             for (y, row) in (first..).zip(rows) {
                 for (x, voxel) in row.iter_mut().enumerate() {
                     *voxel = self.distance_at(&grid.centre([x, y, z])) as f32;
@@ -198,6 +214,10 @@ impl Solid {
     }
 
     /// Fills the slab at `z` with 0 in voids, else 255.
+    ///
+    /// # Panics
+    ///
+    /// If the slab has not the shape of `grid`.
     pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
         let strip = |z: f64, ys: [f64; 2]| self.strip_of_voids(z, ys);
         fill_by_id(grid, z, slab, strip, |void| if void.is_some() { 0 } else { 255 });
@@ -320,7 +340,7 @@ fn fill_by_id<'a, T: Element>(
     strip: impl Fn(f64, [f64; 2]) -> Option<Strip<'a>> + Sync,
     value: impl Fn(Option<usize>) -> T + Sync,
 ) {
-    by_strips(&mut slab, |first, rows| {
+    by_strips(grid, 1, &mut slab, |first, rows| {
         let row_at = |y: usize| grid.row(y, z, &Vector3::zeros());
         let Some(strip) = strip(row_at(first).z, grid.ends_along_y(first, rows.len())) else {
             rows.for_each(|row| row.fill(value(None)));
@@ -337,18 +357,24 @@ fn fill_by_id<'a, T: Element>(
 }
 
 /// Has the rows of a slab filled some at a time, shared among threads: `fill` gets the number of the first and the samples of each.
-fn by_strips<T: Element>(slab: &mut ArrayViewMut3<'_, T>, fill: impl Fn(usize, ChunksExactMut<'_, T>) + Sync) {
-    let (_, nx, channels) = slab.dim();
-    let row = nx * channels;
+fn by_strips<T: Element>(
+    grid: &VoxelGrid,
+    channels: usize,
+    slab: &mut ArrayViewMut3<'_, T>,
+    fill: impl Fn(usize, ChunksExactMut<'_, T>) + Sync,
+) {
+    let [nx, ny, _] = grid.counts;
+    assert_eq!(slab.dim(), (ny, nx, channels), "the slab's shape is not the grid's");
     if slab.is_empty() {
         return;
     }
+    let row = nx * channels;
     if let Some(samples) = slab.as_slice_mut() {
         let strips = samples.par_chunks_mut(ROWS_AT_A_TIME * row).enumerate();
         strips.for_each(|(i, strip)| fill(i * ROWS_AT_A_TIME, strip.chunks_exact_mut(row)));
     } else {
         let mut samples = Array3::from_elem(slab.dim(), T::default());
-        by_strips(&mut samples.view_mut(), fill);
+        by_strips(grid, channels, &mut samples.view_mut(), fill);
         slab.assign(&samples);
     }
 }

@@ -9,7 +9,13 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
 /// Crates that know nothing of ours.
-const FLOOR: [&str; 3] = ["stereology-shape", "stereology-grid", "stereology-spectrum"];
+const FLOOR: [&str; 5] = [
+    "stereology-shape",
+    "stereology-grid",
+    "stereology-spectrum",
+    "stereology-imaging",
+    "stereology-metrics",
+];
 /// Crates that may know several rooms.
 const ROOF: [&str; 3] = ["stereology", "stereology-cli", "xtask"];
 /// Folders that are programs (fuzz stands outside the workspace): they may print and look at the clock.

@@ -49,9 +49,9 @@ fn packs(c: &mut Criterion) {
     }
     let (particles, period) = start(&sphere, 200, 0.3);
     for (name, mode) in [
-        ("spheres 200 at .30, paper", Mode::Paper),
-        ("spheres 200 at .30, anneal", Mode::Anneal),
-        ("spheres 200 at .30, sequential", Mode::Sequential),
+        ("spheres 200 at .30, paper", Mode::paper()),
+        ("spheres 200 at .30, anneal", Mode::anneal()),
+        ("spheres 200 at .30, sequential", Mode::sequential()),
     ] {
         let options = PackOptions::default().with_mode(mode);
         group.bench_function(name, |b| {

@@ -22,6 +22,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 use stereology_shape::{PeriodicBox, isotropic_rotation};
 
 /// Sweeps from the first to the last temperature.
@@ -39,7 +40,7 @@ pub(crate) fn anneal(
     period: &PeriodicBox,
     limits: &Limits,
     trace: &mut Vec<f64>,
-    progress: &dyn Fn(f64) -> ControlFlow<()>,
+    progress: Progress<'_>,
 ) -> End {
     let mean = assembly.radius.iter().sum::<f64>() / assembly.len().max(1) as f64;
     let sweeps = SWEEPS.min(limits.iterations);

@@ -34,8 +34,6 @@ pub(crate) struct Limits {
     /// Sizes are multiplied by this while relaxing: what is apart at true size is then reached in finite time.
     pub(crate) swelling: f64,
     pub(crate) iterations: usize,
-    /// How often particles that no longer yield are shaken.
-    pub(crate) shakes: u64,
     pub(crate) seed: u64,
 }
 
@@ -50,6 +48,8 @@ const SHORTEST_STEP: f64 = 0.15;
 const STRIDE: f64 = 0.2;
 /// Progress is judged after so many iterations.
 const WATCH: usize = 100;
+/// How often particles that no longer yield are shaken.
+const SHAKES: u64 = 3;
 /// How often entangled particles are taken elsewhere.
 const RESCUES: u64 = 30;
 const RESCUE_STREAM: u64 = 1 << 20;
@@ -97,7 +97,7 @@ pub(crate) fn relax(
                 continue;
             }
             if overlaps.energy > 0.98 * before && motion.age > patience {
-                if hopeless || shakes == limits.shakes {
+                if hopeless || shakes == SHAKES {
                     return End::Stuck;
                 }
                 shakes += 1;

@@ -9,7 +9,7 @@ use crate::sequential::CLEARANCE;
 use nalgebra::UnitQuaternion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 
 const STREAM: u64 = 23;
 
@@ -38,12 +38,7 @@ const STREAM: u64 = 23;
 /// assert!((later.fraction() - 0.3).abs() < 1e-12 && later.particles() != packing.particles());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn equilibrate(
-    packing: &Packing,
-    sweeps: usize,
-    seed: u64,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
-) -> Result<Packing, PackError> {
+pub fn equilibrate(packing: &Packing, sweeps: usize, seed: u64, progress: Progress<'_>) -> Result<Packing, PackError> {
     let stand_ins: Vec<StandIn> = packing
         .bodies()
         .iter()

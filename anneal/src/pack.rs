@@ -13,6 +13,7 @@ use crate::proxies::StandIn;
 use crate::sequential::{self, Filling};
 use std::cell::Cell;
 use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
 
 /// Why there is no packing.
@@ -147,26 +148,11 @@ pub fn pack(
     particles: Vec<Particle>,
     period: &PeriodicBox,
     options: &PackOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Packing, PackError> {
     check(bodies, &particles, period)?;
     let fraction = refuse_the_impossible(bodies, &particles, period)?;
-    let swelling = options.swelling.unwrap_or_else(|| swelling_for(fraction));
-    if !(1.0001..=SWELLING_MOST).contains(&swelling) {
-        return Err(PackError::Swelling(swelling));
-    }
-    if !(0.005..=1.0).contains(&options.tolerance) {
-        return Err(PackError::Tolerance(options.tolerance));
-    }
-    let limits = Limits {
-        swelling,
-        iterations: options.iterations,
-        shakes: 3,
-        seed: options.seed,
-    };
-    let guess = Guess::new(progress);
-    let report = |pushes: &Pushes| guess.report(pushes);
-    let mut energies = Vec::new();
+    check_options(options)?;
     let stand_ins: Vec<StandIn> = bodies
         .iter()
         .map(|body| StandIn::of(body, options.proxy, options.tolerance))
@@ -175,39 +161,23 @@ pub fn pack(
     let order = along_a_curve(&particles, period);
     let particles = order.iter().map(|&i| particles[i]).collect();
     let mut assembly = Assembly::new(bodies, &stand_ins, particles, period);
-    let mut tries = 0;
-    let end = match options.mode {
-        Mode::Paper => paper::relax(&mut assembly, period, &limits, &mut energies, &report),
-        Mode::Fast => {
-            if as_balls(&mut assembly, period, &limits, &mut energies, progress) == End::Cancelled {
-                return Err(PackError::Cancelled);
+    let trace = match options.mode {
+        Mode::Sequential { tries } => match sequential::fill(&mut assembly, period, tries, options.seed, progress) {
+            Filling::Complete { tries } => Trace::Tries(tries),
+            Filling::Cancelled => return Err(PackError::Cancelled),
+            Filling::Jammed { placed, next } => {
+                return Err(jammed(assembly, bodies, period, &placed, next, tries, fraction));
             }
-            damped::relax(&mut assembly, period, &limits, &mut energies, &report)
-        }
-        Mode::Anneal => annealing::anneal(&mut assembly, period, &limits, &mut energies, progress),
-        Mode::Sequential => {
-            let each = options.iterations;
-            match sequential::fill(&mut assembly, period, each, options.seed, &mut tries, progress) {
-                Filling::Complete => End::Apart,
-                Filling::Cancelled => End::Cancelled,
-                Filling::Jammed { placed, next } => {
-                    let particles = assembly.into_particles(period);
-                    let placed: Vec<Particle> = placed.into_iter().map(|i| particles[i]).collect();
-                    return Err(PackError::Jammed(Box::new(Jam {
-                        reached: self::fraction(bodies, &placed, period),
-                        placed,
-                        count: particles.len(),
-                        size: particles[next].size,
-                        tries: each,
-                        fraction,
-                    })));
-                }
-            }
+        },
+        Mode::Fast { iterations, .. } | Mode::Paper { iterations, .. } | Mode::Anneal { iterations, .. } => {
+            let limits = Limits {
+                swelling: options.mode.swelling().unwrap_or_else(|| swelling_for(fraction)),
+                iterations,
+                seed: options.seed,
+            };
+            Trace::Energies(relax(&mut assembly, period, &options.mode, &limits, progress)?)
         }
     };
-    if end == End::Cancelled {
-        return Err(PackError::Cancelled);
-    }
     let moved = assembly.into_particles(period);
     let mut particles = moved.clone();
     for (particle, i) in moved.into_iter().zip(order) {
@@ -217,23 +187,93 @@ pub fn pack(
         Ok(packing) => {
             // Nothing is left to cancel; a caller who breaks now has the packing all the same.
             let _ = progress(1.0);
-            Ok(match options.mode {
-                Mode::Sequential => packing.with_tries(tries),
-                _ => packing.with_energies(energies),
+            Ok(match trace {
+                Trace::Tries(tries) => packing.with_tries(tries),
+                Trace::Energies(energies) => packing.with_energies(energies),
             })
         }
         Err(VerifyError::Particle(error)) => Err(error.into()),
         Err(VerifyError::Overlap(overlaps)) => {
-            let iterations = energies.len();
+            let energies = match trace {
+                Trace::Tries(_) => Vec::new(),
+                Trace::Energies(energies) => energies,
+            };
             Err(PackError::Unresolved(Box::new(Unresolved {
                 overlaps,
                 fraction,
-                iterations,
+                iterations: energies.len(),
                 energies,
                 particles,
             })))
         }
     }
+}
+
+/// What a mode counts.
+enum Trace {
+    /// Energy of the overlaps at each iteration.
+    Energies(Vec<f64>),
+    /// Positions tried for all particles together.
+    Tries(usize),
+}
+
+fn check_options(options: &PackOptions) -> Result<(), PackError> {
+    if let Some(swelling) = options.mode.swelling()
+        && !(1.0001..=SWELLING_MOST).contains(&swelling)
+    {
+        return Err(PackError::Swelling(swelling));
+    }
+    if !(0.005..=1.0).contains(&options.tolerance) {
+        return Err(PackError::Tolerance(options.tolerance));
+    }
+    Ok(())
+}
+
+/// Moves particles apart by a mode that relaxes overlaps; returns the energy at each iteration.
+fn relax(
+    assembly: &mut Assembly<'_>,
+    period: &PeriodicBox,
+    mode: &Mode,
+    limits: &Limits,
+    progress: Progress<'_>,
+) -> Result<Vec<f64>, PackError> {
+    let guess = Guess::new(progress);
+    let report = |pushes: &Pushes| guess.report(pushes);
+    let mut energies = Vec::new();
+    let end = match mode {
+        Mode::Paper { .. } => paper::relax(assembly, period, limits, &mut energies, &report),
+        Mode::Anneal { .. } => annealing::anneal(assembly, period, limits, &mut energies, progress),
+        _ => match as_balls(assembly, period, limits, &mut energies, progress) {
+            End::Cancelled => End::Cancelled,
+            _ => damped::relax(assembly, period, limits, &mut energies, &report),
+        },
+    };
+    if end == End::Cancelled {
+        return Err(PackError::Cancelled);
+    }
+    Ok(energies)
+}
+
+/// The error of sequential addition: `placed` have a position, `next` found none.
+fn jammed(
+    assembly: Assembly<'_>,
+    bodies: &[UnitBody],
+    period: &PeriodicBox,
+    placed: &[usize],
+    next: usize,
+    tries: usize,
+    requested: f64,
+) -> PackError {
+    let particles = assembly.into_particles(period);
+    let placed: Vec<Particle> = placed.iter().map(|&i| particles[i]).collect();
+    PackError::Jammed(Box::new(Jam {
+        reached: fraction(bodies, &placed, period),
+        placed,
+        count: particles.len(),
+        size: particles[next].size,
+        tries,
+        fraction: requested,
+    }))
 }
 
 fn refuse_the_impossible(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<f64, PackError> {
@@ -275,7 +315,7 @@ fn as_balls(
     period: &PeriodicBox,
     limits: &Limits,
     energies: &mut Vec<f64>,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> End {
     const ITERATIONS: usize = 100;
     if assembly.round {
@@ -301,13 +341,13 @@ fn as_balls(
 
 /// Guesses from the fall of the energy how far a relaxation has come.
 struct Guess<'a> {
-    progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'a>,
     first: Cell<f64>,
     said: Cell<f64>,
 }
 
 impl<'a> Guess<'a> {
-    fn new(progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync)) -> Self {
+    fn new(progress: Progress<'a>) -> Self {
         Self {
             progress,
             first: Cell::new(0.0),

@@ -9,12 +9,15 @@ use crate::assembly::Assembly;
 use crate::one_by_one::{OneByOne, anywhere};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 use stereology_shape::{PeriodicBox, isotropic_rotation};
 
 /// How a filling ended.
 pub(crate) enum Filling {
-    Complete,
+    Complete {
+        /// Positions tried for all particles together.
+        tries: usize,
+    },
     /// These have found a place, in order of size; the next has not.
     Jammed {
         placed: Vec<usize>,
@@ -23,26 +26,26 @@ pub(crate) enum Filling {
     Cancelled,
 }
 
-/// Adds all particles, the largest first, giving each as many tries as are allowed. What was tried in all is added to `tries`.
+/// Adds all particles, the largest first, with at most `tries_each` random positions per particle.
 pub(crate) fn fill(
     assembly: &mut Assembly<'_>,
     period: &PeriodicBox,
     tries_each: usize,
     seed: u64,
-    tries: &mut usize,
-    progress: &dyn Fn(f64) -> ControlFlow<()>,
+    progress: Progress<'_>,
 ) -> Filling {
     let mut order: Vec<usize> = (0..assembly.len()).collect();
     order.sort_by(|&i, &j| assembly.radius[j].total_cmp(&assembly.radius[i]).then(i.cmp(&j)));
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(STREAM);
+    let mut tries = 0;
     let mut filled = OneByOne::empty(assembly, period, CLEARANCE);
     for (placed, &i) in order.iter().enumerate() {
         if progress(placed as f64 / order.len() as f64).is_break() {
             return Filling::Cancelled;
         }
         let found = (0..tries_each).any(|try_number| {
-            *tries += 1;
+            tries += 1;
             // The first try is where the particle was given.
             if try_number > 0 {
                 let centre = anywhere(&mut rng, period);
@@ -59,7 +62,7 @@ pub(crate) fn fill(
         }
         filled.settle(i);
     }
-    Filling::Complete
+    Filling::Complete { tries }
 }
 
 /// Particles keep this much clear of each other, so that rounding leaves the certificate nothing to find.

@@ -8,7 +8,18 @@ use stereology_anneal::{
 };
 use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
 
-const MODES: [Mode; 4] = [Mode::Fast, Mode::Paper, Mode::Anneal, Mode::Sequential];
+const MODES: [Mode; 4] = [Mode::fast(), Mode::paper(), Mode::anneal(), Mode::sequential()];
+
+/// The mode with a limit of 3,000.
+fn short(mode: Mode) -> Mode {
+    let (iterations, swelling) = (3000, None);
+    match mode {
+        Mode::Paper { .. } => Mode::Paper { iterations, swelling },
+        Mode::Anneal { .. } => Mode::Anneal { iterations, swelling },
+        Mode::Sequential { .. } => Mode::Sequential { tries: iterations },
+        _ => Mode::Fast { iterations, swelling },
+    }
+}
 
 fn packed(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOptions) -> Result<Packing, PackError> {
     let grains = mix(&lognormal_sizes(count, 0.3, 5).unwrap(), &vec![1.0; bodies.len()], 5).unwrap();
@@ -42,7 +53,7 @@ fn every_mode_packs() {
 #[test]
 fn annealing_packs_densely_and_tells_its_energies() {
     let spheres = [UnitBody::new(&Body::sphere(1.0).unwrap())];
-    let packing = packed(&spheres, 300, 0.6, &PackOptions::default().with_mode(Mode::Anneal)).unwrap();
+    let packing = packed(&spheres, 300, 0.6, &PackOptions::default().with_mode(Mode::anneal())).unwrap();
     let energies = packing.energies();
     assert!(energies.len() > 20 && energies[10] > energies[energies.len() - 1]);
 }
@@ -87,7 +98,7 @@ fn threads_change_no_bit_of_any_shape() {
         pool.install(|| packed(bodies, *count, *fraction, &options).unwrap().into_particles())
     };
     for kind in &kinds {
-        for mode in [Mode::Fast, Mode::Paper] {
+        for mode in [Mode::fast(), Mode::paper()] {
             assert_eq!(run(1, mode, kind), run(2, mode, kind), "{mode:?}");
         }
     }
@@ -102,7 +113,7 @@ proptest! {
         let rods = [UnitBody::new(&Body::cuboid([0.3, 0.3, 1.2]).unwrap()), UnitBody::new(&Body::sphere(1.0).unwrap())];
         let period = PeriodicBox::new(Vector3::from(sides)).unwrap();
         let grains = mix(&vec![1.0; count], &[0.7, 0.3], seed).unwrap();
-        let options = PackOptions::default().with_mode(MODES[mode]).with_iterations(3000);
+        let options = PackOptions::default().with_mode(short(MODES[mode]));
         let start = populate(&grains, &period, seed);
         match pack(&rods, start, &period, &options, &|_| ControlFlow::Continue(())) {
             Ok(packing) => {

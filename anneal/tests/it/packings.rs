@@ -112,7 +112,7 @@ fn the_way_of_the_paper_packs_too_and_turns_nobody() {
     let grains = mix(&lognormal_sizes(200, 0.3, 3).unwrap(), &[1.0; 5], 3).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.25).unwrap();
     let start = populate(&grains, &period, 3);
-    let options = PackOptions::default().with_mode(Mode::Paper);
+    let options = PackOptions::default().with_mode(Mode::paper());
     let packing = pack(
         &bodies,
         start.clone(),
@@ -162,7 +162,10 @@ fn a_packing_stays_as_it_is() {
         packing.bodies(),
         packing.particles().to_vec(),
         packing.period(),
-        &PackOptions::default().with_swelling(1.001),
+        &PackOptions::default().with_mode(Mode::Fast {
+            iterations: 1,
+            swelling: Some(1.001),
+        }),
         &|_| ControlFlow::Continue(()),
     );
     assert_eq!(packing.particles(), again.unwrap().particles());

@@ -64,7 +64,10 @@ fn what_is_nearly_round_is_refused_nearly_as_soon() {
 
 #[test]
 fn jamming_is_reported_with_what_remains() {
-    let options = PackOptions::default().with_iterations(300);
+    let options = PackOptions::default().with_mode(Mode::Fast {
+        iterations: 300,
+        swelling: None,
+    });
     let Err(PackError::Unresolved(failure)) = try_pack(&[sphere()], 200, 0.72, &options) else {
         panic!("packed at .72")
     };
@@ -117,7 +120,10 @@ fn values_that_are_none_are_refused() {
         &[sphere()],
         vec![],
         &period,
-        &PackOptions::default().with_swelling(2.0),
+        &PackOptions::default().with_mode(Mode::Paper {
+            iterations: 1,
+            swelling: Some(2.0),
+        }),
         &|_| ControlFlow::Continue(()),
     );
     assert!(matches!(result, Err(PackError::Swelling(_))));
@@ -128,7 +134,7 @@ fn values_that_are_none_are_refused() {
 
 #[test]
 fn a_jam_says_how_far_it_came() {
-    let options = PackOptions::default().with_mode(Mode::Sequential).with_iterations(2000);
+    let options = PackOptions::default().with_mode(Mode::Sequential { tries: 2000 });
     let Err(PackError::Jammed(jam)) = try_pack(&[sphere()], 300, 0.5, &options) else {
         panic!("placed one by one at .5")
     };

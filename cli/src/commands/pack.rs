@@ -123,13 +123,24 @@ impl Mode {
         }
     }
 
-    /// The way of packing.
-    pub fn way(self) -> anneal::Mode {
+    /// The library's mode, with its default limits.
+    pub fn by_default(self) -> anneal::Mode {
         match self {
-            Self::Fast => anneal::Mode::Fast,
-            Self::Paper => anneal::Mode::Paper,
-            Self::Anneal => anneal::Mode::Anneal,
-            Self::Sequential => anneal::Mode::Sequential,
+            Self::Fast => anneal::Mode::fast(),
+            Self::Paper => anneal::Mode::paper(),
+            Self::Anneal => anneal::Mode::anneal(),
+            Self::Sequential => anneal::Mode::sequential(),
+        }
+    }
+
+    /// The library's mode with `--iterations`.
+    fn limited(self, iterations: usize) -> anneal::Mode {
+        let swelling = None;
+        match self {
+            Self::Fast => anneal::Mode::Fast { iterations, swelling },
+            Self::Paper => anneal::Mode::Paper { iterations, swelling },
+            Self::Anneal => anneal::Mode::Anneal { iterations, swelling },
+            Self::Sequential => anneal::Mode::Sequential { tries: iterations },
         }
     }
 }
@@ -181,14 +192,13 @@ impl Population {
 impl Pack {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = PackOptions::default()
-            .with_mode(self.mode.way())
+            .with_mode(self.mode.limited(self.iterations))
             .with_proxy(match self.proxy {
                 Proxy::Parts => anneal::Proxy::Parts,
                 Proxy::Hull => anneal::Proxy::Hull,
                 Proxy::Outline => anneal::Proxy::Outline,
             })
             .with_tolerance(self.tolerance)
-            .with_iterations(self.iterations)
             .with_seed(everywhere.seed);
         if !(0.005..=1.0).contains(&self.tolerance) {
             return Err(Failure::usage("--tolerance: a share from 0.005 to 1 is needed"));

@@ -165,7 +165,7 @@ impl Synthesize {
             fraction: self.solid.fraction,
             voids: self.solid.voids.clone(),
             pack: PackOptions::default()
-                .with_mode(self.solid.pack_mode.way())
+                .with_mode(self.solid.pack_mode.by_default())
                 .with_seed(seed),
             texture: self.texture.options(self.texture_mode, seed),
             texture_voxels: self.solid.texture_voxels,

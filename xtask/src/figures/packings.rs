@@ -24,10 +24,10 @@ const GREY: RGBColor = RGBColor(120, 120, 120);
 
 pub fn draw(folder: &Path) -> Result<()> {
     let modes = [
-        ("fast", Mode::Fast, BLUE),
-        ("paper", Mode::Paper, RED),
-        ("anneal", Mode::Anneal, GREEN),
-        ("sequential", Mode::Sequential, OCHRE),
+        ("fast", Mode::fast(), BLUE),
+        ("paper", Mode::paper(), RED),
+        ("anneal", Mode::anneal(), GREEN),
+        ("sequential", Mode::sequential(), OCHRE),
     ];
     let sphere = [UnitBody::new(&Body::sphere(1.0)?)];
     let mut curves = Vec::new();
@@ -45,7 +45,7 @@ pub fn draw(folder: &Path) -> Result<()> {
         )?;
         rows.push(judged(name, &packing));
         curves.push((name, radial(&packing), colour));
-        if mode == Mode::Fast {
+        if mode == Mode::fast() {
             let later = equilibrate(&packing, 300, 0, &|_| ControlFlow::Continue(()))?;
             picture(&later, &by_contacts(&later), &folder.join("packing-equilibrium.png"))?;
             rows.push(judged("equilibrium", &later));

@@ -1,34 +1,10 @@
 //! The contours of a section while it moves: which triangle belongs to which, what area each encloses, which are holes of which.
 
+use crate::contour_area::ContourArea;
 use crate::depth_measure::DepthMeasure;
-use crate::sweep::Plane;
+use crate::plane::Plane;
 
 const NONE: u32 = u32::MAX;
-
-/// Signed area of a contour as a function of height, about some height: area + slope t + curvature t².
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct State {
-    pub(crate) area: f64,
-    pub(crate) slope: f64,
-    pub(crate) curvature: f64,
-}
-
-impl State {
-    fn at(&self, t: f64) -> f64 {
-        self.area + t * (self.slope + t * self.curvature)
-    }
-
-    pub(crate) fn advance(&mut self, t: f64) {
-        self.area = self.at(t);
-        self.slope += 2.0 * t * self.curvature;
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.area += other.area;
-        self.slope += other.slope;
-        self.curvature += other.curvature;
-    }
-}
 
 /// Contours by number; a number is given to a new contour when an old one ends.
 #[derive(Default)]
@@ -49,7 +25,7 @@ pub(crate) struct Contours {
 #[derive(Clone, Copy)]
 struct Contour {
     /// About `since`, the height up to which its profile has been measured.
-    state: State,
+    state: ContourArea,
     since: f64,
     /// A triangle on it.
     triangle: u32,
@@ -99,11 +75,11 @@ impl Contours {
         self.of_triangle[triangle as usize] = NONE;
     }
 
-    pub(crate) fn set_state(&mut self, contour: u32, state: State) {
+    pub(crate) fn set_state(&mut self, contour: u32, state: ContourArea) {
         self.contours[contour as usize].state = state;
     }
 
-    pub(crate) fn begin(&mut self, since: f64, state: State) -> u32 {
+    pub(crate) fn begin(&mut self, since: f64, state: ContourArea) -> u32 {
         self.changed = true;
         let new = Contour {
             state,

@@ -3,8 +3,10 @@
 use crate::depth_measure::{DepthMeasure, Moments};
 use crate::directions::half_sphere;
 use crate::distribution::{Distribution, Table};
+use crate::plane::Surface;
+use crate::sample::Sample;
 use crate::section_law::{Calipers, DEFAULT_CELLS, SectionLaw, Squares, standard_error};
-use crate::sweep::{Surface, Sweep};
+use crate::sweep::Sweep;
 use nalgebra::UnitQuaternion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,10 +14,8 @@ use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use stereology_metrics::Progress;
 use stereology_shape::{Body, BodyKind, ClosedMesh, isotropic_rotation};
-
-/// Called with the share done, from any thread; `Break` cancels.
-pub type Progress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 
 /// How much work a section law is worth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,13 +208,6 @@ fn check(options: &SectionOptions) -> Result<(), SectionLawError> {
     } else {
         Ok(())
     }
-}
-
-/// What one set of directions, or one batch of random sections, saw: means over directions of lengths of offsets.
-pub(crate) struct Sample {
-    /// Offsets with a profile up to each node's area.
-    pub(crate) below: Vec<f64>,
-    pub(crate) moments: Moments,
 }
 
 /// Cells of the table of F that an error is worth.
@@ -492,23 +485,6 @@ impl Shares {
         }
         let whole = sample.below[sample.below.len() - 1];
         mean + (sample.below[node] - mean * whole) / self.whole
-    }
-}
-
-impl Sample {
-    pub(crate) fn mean(measure: &DepthMeasure, count: f64) -> Self {
-        let moments = measure.moments;
-        Self {
-            below: measure.cumulative().iter().map(|length| length / count).collect(),
-            moments: Moments {
-                profiles: moments.profiles / count,
-                holes: moments.holes / count,
-                area: moments.area / count,
-                area_squared: moments.area_squared / count,
-                total_squared: moments.total_squared / count,
-                largest: moments.largest,
-            },
-        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Absolute kernels, in units of length, for any bins: what unfolding takes.
 
-use crate::SectionLaw;
+use crate::section_law::SectionLaw;
 use nalgebra::DMatrix;
+use stereology_metrics::{EdgesError, check_edges};
 
 /// Which sizes the particles of a size bin have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,44 +25,6 @@ pub enum Counting {
     /// count of profiles per hit m: number densities of non-convex bodies come out m times too large (torus 1.4, L 1.1), and mixtures in wrong
     /// proportions. Equal to [`Counting::Profiles`] for convex bodies.
     Paper,
-}
-
-/// Edges of bins must be finite, not negative and increasing, two or more.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EdgesError {
-    /// Fewer than two edges.
-    #[error("bins need at least two edges, {0} given")]
-    TooFew(usize),
-    /// An edge that is no length.
-    #[error("edge {index} is {value}: edges must be finite and not negative")]
-    NotALength {
-        /// Which, from 0.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
-    /// An edge that is not above the one before.
-    #[error("edge {index} is not larger than the one before it: edges must increase")]
-    NotIncreasing {
-        /// Which, from 0.
-        index: usize,
-    },
-}
-
-fn check(edges: &[f64]) -> Result<(), EdgesError> {
-    if edges.len() < 2 {
-        return Err(EdgesError::TooFew(edges.len()));
-    }
-    for (index, &value) in edges.iter().enumerate() {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(EdgesError::NotALength { index, value });
-        }
-        if index > 0 && value <= edges[index - 1] {
-            return Err(EdgesError::NotIncreasing { index });
-        }
-    }
-    Ok(())
 }
 
 impl SectionLaw {
@@ -109,8 +72,8 @@ impl SectionLaw {
         sizes: Sizes,
         counting: Counting,
     ) -> Result<DMatrix<f64>, EdgesError> {
-        check(profile_edges)?;
-        check(size_edges)?;
+        check_edges(profile_edges)?;
+        check_edges(size_edges)?;
         let caliper = match counting {
             Counting::Profiles => self.caliper_effective(),
             Counting::Paper => self.caliper_hull(),
@@ -142,11 +105,12 @@ impl SectionLaw {
 
 #[cfg(test)]
 mod tests {
-    use super::{EdgesError, Sizes};
+    use super::Sizes;
     use crate::SectionLaw;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
     use std::sync::LazyLock;
+    use stereology_metrics::EdgesError;
 
     fn equal_edges(largest: f64, bins: usize) -> Vec<f64> {
         (0..=bins).map(|k| largest * k as f64 / bins as f64).collect()

@@ -44,6 +44,7 @@
 //! of profiles per hit of bodies that are not convex ([`Counting::Paper`]): 1.4 to 1.5 for a torus, and number densities come out as many
 //! times too large.
 
+mod contour_area;
 mod contours;
 mod depth_measure;
 mod directions;
@@ -52,13 +53,16 @@ mod ellipsoid;
 mod exact;
 mod kernel;
 mod monte_carlo;
+mod plane;
 mod raster;
 mod saltikov;
+mod sample;
 mod section_law;
 mod sweep;
 
-pub use exact::{Effort, Progress, SectionLawError, SectionOptions};
-pub use kernel::{Counting, EdgesError, Sizes};
+pub use exact::{Effort, SectionLawError, SectionOptions};
+pub use kernel::{Counting, Sizes};
 pub use monte_carlo::{LargestArea, MonteCarloOptions, Residual, Slicing};
 pub use saltikov::{BinCountError, SphereKernel, condition_number, geometric_classes, profiles_per_area, scale};
 pub use section_law::SectionLaw;
+pub use stereology_metrics::{EdgesError, Progress};

@@ -2,8 +2,9 @@
 
 use crate::depth_measure::Moments;
 use crate::distribution::Table;
-use crate::exact::{Progress, Sample, SectionLawError};
+use crate::exact::SectionLawError;
 use crate::raster::StencilBuffer;
+use crate::sample::Sample;
 use crate::section_law::{Calipers, DEFAULT_CELLS, SectionLaw, standard_error};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -12,6 +13,7 @@ use rand_distr::{Distribution, UnitSphere};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use stereology_metrics::Progress;
 use stereology_shape::{Body, BodyKind, TriangleMesh};
 
 /// Which area counts as the largest, A_max.

@@ -3,7 +3,7 @@
 use crate::depth_measure::Moments;
 use crate::distribution::{Distribution, Table};
 use crate::ellipsoid;
-use crate::exact::Sample;
+use crate::sample::Sample;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::PI;

@@ -6,7 +6,8 @@ use nalgebra::DMatrix;
 use std::hint::black_box;
 use std::time::Duration;
 use stereology_unfold::{
-    Bootstrap, Kernel, Method, ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, equal_edges, unfold,
+    Bootstrap, Kernel, Method, ProfileCounts, ReportedEdgesError, SizeBins, UnfoldOptions, capped_kernel, equal_edges,
+    unfold,
 };
 
 fn spheres(rows: usize) -> (Kernel, Vec<f64>) {
@@ -25,7 +26,9 @@ fn spheres(rows: usize) -> (Kernel, Vec<f64>) {
 /// Ten reported bins of 40, a hundred profile bins.
 fn fine() -> (Kernel, Vec<f64>) {
     let (profile_edges, edges) = (equal_edges(1.0, 100), equal_edges(1.0, 10));
-    let sizes = SizeBins::integrated(&equal_edges(1.0, 40)).and_then(|bins| bins.reported_in(&edges));
+    let sizes = SizeBins::integrated(&equal_edges(1.0, 40))
+        .map_err(ReportedEdgesError::from)
+        .and_then(|bins| bins.reported_in(&edges));
     let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
     let kernel = capped_kernel(&law, 1.0, 0.0, &profile_edges, sizes.expect("edges increase"), 0.5);
     (kernel.expect("a kernel of spheres"), profile_edges)

@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             found.volume_fraction.value,
         );
         for finding in &found.findings {
-            println!("           {}: {finding}", finding.code());
+            println!("           {}: {}", finding.code, finding.message);
         }
     }
     Ok(())

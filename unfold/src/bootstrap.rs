@@ -1,12 +1,15 @@
 //! Counts drawn again from a fit, or slices drawn again from those there are, fitted again side by side, each from its own stream of random numbers.
 
-use crate::normal::{normal_quantile, student_quantile};
-use crate::{Bootstrap, Interval, Progress, Resampling, UnfoldError};
+use crate::estimate::Interval;
+use crate::options::{Bootstrap, Resampling};
+use crate::quantiles::{normal_quantile, student_quantile};
+use crate::unfold_error::UnfoldError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use stereology_metrics::Progress;
 
 /// Densities of every replicate, in order, and of the fit they are replicates of.
 #[derive(Clone, Debug, PartialEq)]

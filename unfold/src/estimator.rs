@@ -2,9 +2,11 @@
 
 use crate::expectation_maximisation::maximise;
 use crate::log_densities::{Effort, Penalty, Start, Workspace, climb};
+use crate::options::{Method, UnfoldOptions};
 use crate::penalised::smooth;
 use crate::problem::Problem;
-use crate::{Method, UnfoldError, UnfoldOptions, inverse, nnls, sparse};
+use crate::unfold_error::UnfoldError;
+use crate::{inverse, nnls, sparse};
 use nalgebra::DVector;
 
 /// Densities of the kept bins of the kernel, and how they came about.

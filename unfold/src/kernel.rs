@@ -1,6 +1,6 @@
 //! Kernels as unfolding takes them, and mixtures of the kernels of several particle types.
 
-use crate::{EdgesError, SizeBins};
+use crate::size_bins::{ReportedEdgesError, SizeBins};
 use nalgebra::DMatrix;
 
 /// An absolute kernel with the sizes of its columns.
@@ -133,8 +133,8 @@ impl Kernel {
     ///
     /// # Errors
     ///
-    /// [`EdgesError`] if the edges make no bins or are not among those of the kernel's.
-    pub fn reported_in(mut self, edges: &[f64]) -> Result<Self, EdgesError> {
+    /// [`ReportedEdgesError`] if the edges bound no bins or are not among those of the kernel.
+    pub fn reported_in(mut self, edges: &[f64]) -> Result<Self, ReportedEdgesError> {
         self.sizes = self.sizes.reported_in(edges)?;
         Ok(self)
     }

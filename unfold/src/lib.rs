@@ -32,7 +32,7 @@
 //! let interval = found.total.interval.ok_or("no interval")?;
 //! assert!(interval.lower <= found.total.value && found.total.value <= interval.upper);
 //! for finding in &found.findings {
-//!     println!("{}: {finding}", finding.code());
+//!     println!("{}: {}", finding.code, finding.message);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -74,39 +74,44 @@ mod bootstrap;
 mod capping;
 mod cholesky;
 mod edge_rule;
+mod estimate;
 mod estimator;
 mod expectation_maximisation;
-mod finding;
+mod findings;
 mod inverse;
 mod kernel;
 mod largest_size;
 mod log_densities;
 mod nnls;
-mod normal;
 mod options;
 mod particle_types;
 mod penalised;
 mod problem;
 mod profile_counts;
 mod profile_likelihood;
+mod quantiles;
 mod size_bins;
 mod size_distribution;
 mod sparse;
+mod unfold_error;
 mod unfolding;
 mod unknown_fractions;
 
 pub use capping::capped_kernel;
 pub use edge_rule::{BoundingBox, EdgeRule, edge_weights};
-pub use finding::Finding;
+pub use estimate::{CrossCheck, Estimate, Interval};
+pub use findings::with_cure;
 pub use kernel::{Kernel, KernelError, mix_kernels};
 pub use largest_size::{LargestSize, largest_size};
 pub use options::{Bootstrap, Method, Resampling, UnfoldOptions};
 pub use particle_types::{TypesUnfolding, unfold_types, unfold_types_with_progress};
 pub use profile_counts::{ProfileCounts, ProfilesError};
 pub use profile_likelihood::{LikelyParameter, likely_parameter};
-pub use size_bins::{EdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges};
-pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
-pub use unfolding::{
-    CrossCheck, Estimate, Interval, PenaltyUsed, Progress, UnfoldError, Unfolding, unfold, unfold_with_progress,
+pub use size_bins::{
+    ReportedEdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges,
 };
+pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
+pub use stereology_metrics::{EdgesError, Finding, Progress};
+pub use unfold_error::UnfoldError;
+pub use unfolding::{PenaltyUsed, Unfolding, unfold, unfold_with_progress};
 pub use unknown_fractions::{Fractions, unknown_fractions};

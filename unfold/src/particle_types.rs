@@ -3,10 +3,9 @@
 use crate::bootstrap::Replicates;
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
 use crate::unfolding::{Quantities, Replicated, sum_of_group, unfold_replicated};
-use crate::{
-    Bootstrap, Estimate, Interval, Kernel, ProfileCounts, Progress, Resampling, UnfoldError, UnfoldOptions, Unfolding,
-};
+use crate::{Bootstrap, Estimate, Interval, Kernel, ProfileCounts, Resampling, UnfoldError, UnfoldOptions, Unfolding};
 use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 
 /// Number densities of several types, each and together.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! What was seen: profiles counted by size on an examined area.
 
-use crate::size_bins::{EdgesError, check_edges};
+use stereology_metrics::{EdgesError, check_edges};
 
 /// Slices numbered beyond this are numbered anew.
 const MOST_SLICES: usize = 1_000_000;

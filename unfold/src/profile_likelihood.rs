@@ -1,8 +1,8 @@
 //! One number of the model by likelihood: the scale of eq. (7), the largest size, the capping angle.
 
 use crate::estimator::evidence;
-use crate::normal::normal_quantile;
 use crate::problem::Problem;
+use crate::quantiles::normal_quantile;
 use crate::{Interval, Kernel, KernelError, ProfileCounts, UnfoldError, UnfoldOptions};
 
 /// A parameter of the kernel, as the counts have it.

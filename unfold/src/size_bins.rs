@@ -1,47 +1,20 @@
 //! Bins of particle sizes, (a, b], and how large the particles in them are.
 
-/// Edges of bins must be finite, not negative and increasing, two or more.
+use stereology_metrics::{EdgesError, check_edges};
+
+/// Reported bins that are not made of whole bins.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum EdgesError {
-    /// Fewer than two edges.
-    #[error("bins need at least two edges, {0} given")]
-    TooFew(usize),
-    /// An edge that is no length.
-    #[error("edge {index} is {value}: edges must be finite and not negative")]
-    NotALength {
-        /// Which, from 0.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
-    /// An edge of reported bins that is no edge of the bins themselves.
-    #[error("reported edge {value} is no edge of the bins: reported bins are made of whole ones")]
+pub enum ReportedEdgesError {
+    /// The edges bound no bins.
+    #[error(transparent)]
+    Edges(#[from] EdgesError),
+    /// A reported edge that is not among the edges of the bins.
+    #[error("the reported edge {value} is not an edge of the bins: every reported bin must consist of whole bins")]
     NotAnEdge {
-        /// Its value.
+        /// The edge.
         value: f64,
     },
-    /// An edge that is not above the one before.
-    #[error("edge {index} is not larger than the one before it: edges must increase")]
-    NotIncreasing {
-        /// Which, from 0.
-        index: usize,
-    },
-}
-
-pub(crate) fn check_edges(edges: &[f64]) -> Result<(), EdgesError> {
-    if edges.len() < 2 {
-        return Err(EdgesError::TooFew(edges.len()));
-    }
-    for (index, &value) in edges.iter().enumerate() {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(EdgesError::NotALength { index, value });
-        }
-        if index > 0 && value <= edges[index - 1] {
-            return Err(EdgesError::NotIncreasing { index });
-        }
-    }
-    Ok(())
 }
 
 /// Edges of `bins` equal bins of (0, `largest`], the paper's.
@@ -144,7 +117,7 @@ pub fn divided_edges(edges: &[f64], bins: usize, threshold: f64) -> Vec<f64> {
 /// let edges = equal_edges(1.0, 10);
 /// let bins = SizeBins::integrated(&divided_edges(&edges, 40, 0.0))?.reported_in(&edges)?;
 /// assert_eq!((bins.len(), bins.reported_edges().len()), (40, 11));
-/// # Ok::<(), stereology_unfold::EdgesError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeBins {
@@ -194,8 +167,8 @@ impl SizeBins {
     ///
     /// # Errors
     ///
-    /// [`EdgesError`] if the edges make no bins or are not among these, first and last included.
-    pub fn reported_in(mut self, reported: &[f64]) -> Result<Self, EdgesError> {
+    /// [`ReportedEdgesError`] if the edges bound no bins or are not among these, first and last included.
+    pub fn reported_in(mut self, reported: &[f64]) -> Result<Self, ReportedEdgesError> {
         check_edges(reported)?;
         let known = |value: f64| {
             self.edges
@@ -203,13 +176,13 @@ impl SizeBins {
                 .any(|edge| (edge - value).abs() <= 1e-9 * self.largest())
         };
         if let Some(&value) = reported.iter().find(|value| !known(**value)) {
-            return Err(EdgesError::NotAnEdge { value });
+            return Err(ReportedEdgesError::NotAnEdge { value });
         }
         let ends = |edges: &[f64]| (edges[0], edges[edges.len() - 1]);
         let ((first, last), (own_first, own_last)) = (ends(reported), ends(&self.edges));
         for (value, own) in [(first, own_first), (last, own_last)] {
             if (value - own).abs() > 1e-9 * self.largest() {
-                return Err(EdgesError::NotAnEdge { value: own });
+                return Err(ReportedEdgesError::NotAnEdge { value: own });
             }
         }
         self.reported = reported.to_vec();

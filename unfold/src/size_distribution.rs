@@ -1,6 +1,7 @@
 //! What densities say in the words of the field: means and percentiles by number and by volume, and the sieve curve.
 
-use crate::{Estimate, SizeBins};
+use crate::estimate::Estimate;
+use crate::size_bins::SizeBins;
 
 /// Shares of particles at which [`Percentiles`] are given.
 pub const SHARES: [f64; 5] = [0.1, 0.25, 0.5, 0.75, 0.9];

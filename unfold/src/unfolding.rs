@@ -1,141 +1,17 @@
 //! From profiles per area to particles per volume: the result, what it claims, and how far to trust it.
 
 use crate::bootstrap::{Deviation, Replicates, Source, replicate, slices_drawn};
+use crate::estimate::{CrossCheck, Estimate, Interval};
 use crate::estimator::{Fit, again, estimate, workspace};
-use crate::finding::{Finding, findings};
-use crate::kernel::condition_number;
+use crate::findings::findings;
+use crate::kernel::{Kernel, condition_number};
+use crate::options::{Method, UnfoldOptions};
 use crate::problem::Problem;
-use crate::profile_counts::mean_profile_area;
+use crate::profile_counts::{ProfileCounts, mean_profile_area};
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
-use crate::{EdgesError, Kernel, KernelError, Method, ProfileCounts, UnfoldOptions};
+use crate::unfold_error::UnfoldError;
 use std::ops::ControlFlow;
-
-/// Called with the share done, from any thread; `Break` cancels.
-pub type Progress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
-
-/// Why counts cannot be unfolded.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum UnfoldError {
-    /// The kernel is for other profile bins.
-    #[error("{counts} profile bins for a kernel of {rows} rows: build the kernel for the edges of the counts")]
-    Rows {
-        /// Bins of the counts.
-        counts: usize,
-        /// Rows of the kernel.
-        rows: usize,
-    },
-    /// The inverse of a kernel that has none.
-    #[error(
-        "the paper's method needs as many profile bins as size bins, {rows} and {columns} are left: use equal edges, or nnls or em"
-    )]
-    NotSquare {
-        /// Profile bins above the threshold.
-        rows: usize,
-        /// Size bins that show profiles above the threshold.
-        columns: usize,
-    },
-    /// The kernel's inverse does not exist.
-    #[error("the kernel is singular: merge size bins, or use nnls or em")]
-    Singular,
-    /// Profiles of a size that no particle can show.
-    #[error("profile bin {} holds profiles, but no particle of the kernel shows any there: check the edges and the largest size", .bin + 1)]
-    Unexplained {
-        /// Profile bin, from 0.
-        bin: usize,
-    },
-    /// The threshold is not a length, or leaves nothing.
-    #[error("the threshold {0} leaves no profiles: it must be finite, not negative and below the largest profile")]
-    Threshold(f64),
-    /// A bootstrap that cannot be.
-    #[error("a bootstrap needs 2 or more replicates and a level between 0 and 1, not {replicates} and {level}")]
-    Bootstrap {
-        /// Replicates asked for.
-        replicates: usize,
-        /// Level asked for.
-        level: f64,
-    },
-    /// A tolerance that is not positive.
-    #[error("the tolerance {0} must be positive")]
-    Tolerance(f64),
-    /// A smoothing that is none.
-    #[error("the smoothing {0} must lie between 0 and 0.25")]
-    Smoothing(f64),
-    /// Slices to draw again that are not there.
-    #[error(
-        "slices can be drawn again from two or more, there are {0}: give the slice of every profile, or draw counts"
-    )]
-    TooFewSlices(usize),
-    /// Several types on different bins, or no type.
-    #[error(
-        "type {index} has other bins than the first, or there is no type: several types are unfolded on common edges"
-    )]
-    Bins {
-        /// Which, from 0.
-        index: usize,
-    },
-    /// A range of a parameter that is none, or holds no value that can explain the profiles.
-    #[error(
-        "the range {from} to {to} holds no value with which all profiles can be explained: it must be finite, rising, and reach high enough"
-    )]
-    Range {
-        /// Lower end.
-        from: f64,
-        /// Upper end.
-        to: f64,
-    },
-    /// Fractions of types that the counts do not tell.
-    #[error(
-        "the counts do not tell the fractions of the types: type {index} could be {:.0} to {:.0} % (condition number {condition_number:.0}); give the fractions, or label the profiles",
-        100.0 * .lower, 100.0 * .upper
-    )]
-    FractionsUnknowable {
-        /// The type, from 0.
-        index: usize,
-        /// Lower end of its interval.
-        lower: f64,
-        /// Upper end of its interval.
-        upper: f64,
-        /// How alike the profiles of the types are.
-        condition_number: f64,
-    },
-    /// A kernel that is none.
-    #[error(transparent)]
-    Kernel(#[from] KernelError),
-    /// Edges that make no bins.
-    #[error(transparent)]
-    Edges(#[from] EdgesError),
-    /// The caller broke off.
-    #[error("cancelled")]
-    Cancelled,
-}
-
-/// From where to where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    /// Lower end.
-    pub lower: f64,
-    /// Upper end.
-    pub upper: f64,
-}
-
-/// A value with its interval, if a bootstrap was asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Bias-corrected interval of the bootstrap; see [`Bootstrap`](crate::Bootstrap) for how and what it is worth.
-    pub interval: Option<Interval>,
-}
-
-/// Two ways to the same number.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CrossCheck {
-    /// As counted on the sections.
-    pub observed: f64,
-    /// As the densities have it.
-    pub expected: f64,
-}
+use stereology_metrics::{Finding, Progress};
 
 /// The penalty of a smooth estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,8 +46,8 @@ const ROUNDS: usize = 3;
 /// let edges = equal_edges(1.0, 5);
 /// let bins = divided_edges(&edges, 50, 0.0);
 /// let kernel = |law: &dyn Fn(f64) -> f64| {
-///     let sizes = SizeBins::integrated(&divided_edges(&edges, 40, 0.0)).and_then(|sizes| sizes.reported_in(&edges));
-///     capped_kernel(law, 1.0, 0.0, &bins, sizes.map_err(|_| stereology_unfold::KernelError::Volume(0.0))?, 0.5)
+///     let sizes = SizeBins::integrated(&divided_edges(&edges, 40, 0.0))?.reported_in(&edges)?;
+///     Ok::<_, Box<dyn std::error::Error>>(capped_kernel(law, 1.0, 0.0, &bins, sizes, 0.5)?)
 /// };
 /// let kinds = [kernel(&|x| x.powi(40))?, kernel(&|x| 1.0 - (1.0 - x).powi(6))?];
 /// let shown = kinds[0].matrix().column(30) * 1000.0 + kinds[1].matrix().column(30) * 2000.0;

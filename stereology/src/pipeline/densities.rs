@@ -272,7 +272,7 @@ impl ParticleTypes {
 pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityError> {
     kernel
         .reported_in(edges)
-        .map_err(|error| DensityError::Unfold(UnfoldError::Edges(error)))
+        .map_err(|error| DensityError::Unfold(UnfoldError::Reported(error)))
 }
 
 impl ParticleDensities {
@@ -289,7 +289,7 @@ impl ParticleDensities {
         self.all
             .findings
             .iter()
-            .map(|finding| Warning::new(finding.code(), finding.to_string()))
+            .map(|finding| Warning::new(finding.code, finding.message.clone()))
             .collect()
     }
 }

@@ -6,7 +6,9 @@ use crate::pipeline::{
     size_edges,
 };
 use stereology_kmatrix::Sizes;
-use stereology_unfold::{Finding, Kernel, Method, ProfileCounts, UnfoldOptions, divided_edges, equal_edges, unfold};
+use stereology_unfold::{
+    Finding, Kernel, Method, ProfileCounts, UnfoldOptions, divided_edges, equal_edges, unfold, with_cure,
+};
 
 /// Fits of one table of profiles.
 pub(crate) struct Fitting<'a> {
@@ -119,7 +121,7 @@ impl<'a> Fitting<'a> {
         let bins = self.edges.len() - 1;
         findings
             .iter()
-            .map(|finding| finding.with_cure(bins, &in_fewer))
+            .map(|finding| with_cure(finding, bins, &in_fewer))
             .collect()
     }
 

@@ -128,14 +128,14 @@ fn threshold_drops_rows_and_says_nothing_below() {
         }
         assert_relative_eq!(found.total.value, 3.5, epsilon = 0.02);
         assert_eq!(found.threshold, 0.4);
-        assert!(found.findings.iter().all(|finding| finding.code() != "threshold-moved"));
+        assert!(found.findings.iter().all(|finding| finding.code != "threshold-moved"));
         // Inside a bin the whole bin goes, and it is said.
         let moved = unfold(&counts, &kernel, &with(method).with_min_size(0.41)).unwrap();
         assert_eq!(
             (moved.threshold, moved.number_density[2]),
             (equal_edges(1.0, 5)[3], None)
         );
-        assert!(moved.findings.iter().any(|finding| finding.code() == "threshold-moved"));
+        assert!(moved.findings.iter().any(|finding| finding.code == "threshold-moved"));
     }
 }
 
@@ -152,7 +152,7 @@ fn missing_fines_come_out_negative_and_are_reported() {
     let found = unfold(&counts, &kernel, &with(Method::Paper)).unwrap();
     assert_eq!(found.clamped_bins, [0]);
     assert_eq!(found.number_density[0], Some(0.0));
-    assert_eq!(found.findings[0].code(), "negative-bins");
+    assert_eq!(found.findings[0].code, "negative-bins");
 }
 
 /// Labelled types, eq. (9): each type comes out with its own densities, and the refolded sum is the observed one.

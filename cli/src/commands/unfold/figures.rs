@@ -131,7 +131,7 @@ pub fn categories(of: &CategoryDensities) -> Vec<Value> {
             fields["findings"] = found
                 .findings
                 .iter()
-                .map(|finding| json!({ "code": finding.code(), "message": finding.to_string() }))
+                .map(|finding| json!({ "code": finding.code, "message": finding.message }))
                 .collect();
             fields
         })

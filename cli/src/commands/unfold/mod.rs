@@ -303,11 +303,11 @@ impl Unfold {
             answer.field("categories_sum", group_figures(&Group::sum(&of.found)));
         }
         for finding in &sum.findings {
-            answer.warn(Warning::new(finding.code(), finding.to_string()));
+            answer.warn(Warning::new(finding.code, finding.message.clone()));
         }
         for (kind, part) in by_type.iter().enumerate() {
             for finding in &part.findings {
-                answer.warn(Warning::new(finding.code(), format!("type {kind}: {finding}")));
+                answer.warn(Warning::new(finding.code, format!("type {kind}: {}", finding.message)));
             }
         }
         let unlabelled = profiles.iter().filter(|profile| profile.kind.is_none()).count();

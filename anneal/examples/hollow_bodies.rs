@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use std::error::Error;
 use std::ops::ControlFlow;
 use stereology_anneal::{ConvexParts, PackOptions, Proxy, box_for_fraction, lognormal_sizes, mix, pack, populate};
-use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+use stereology_shape::{Arrangement, Body, ClosedMesh, TriangleMesh, UnitBody};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let ring = TriangleMesh::torus(2.0, 0.7, 32, 16);
@@ -30,7 +30,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     for proxy in [Proxy::Parts, Proxy::Hull] {
         let options = PackOptions::default().with_proxy(proxy);
         let start = populate(&grains, &period, 0);
-        match pack(&bodies, start, &period, &options, &|_| ControlFlow::Continue(())) {
+        match pack(&Arrangement::new(&bodies[..], start, period)?, &options, &|_| {
+            ControlFlow::Continue(())
+        }) {
             Ok(packing) => println!(
                 "{proxy:?}: {} particles at a volume fraction of {:.6}, none overlap; {} iterations",
                 packing.particles().len(),

@@ -10,16 +10,18 @@ use nalgebra::Vector3;
 use std::error::Error;
 use std::ops::ControlFlow;
 use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
-use stereology_shape::{Body, UnitBody};
+use stereology_shape::{Arrangement, Body, UnitBody};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let bodies = [UnitBody::new(&Body::rock(1)), UnitBody::new(&Body::sphere(1.0)?)];
     let grains = mix(&lognormal_sizes(1000, 0.3, 0)?, &[0.7, 0.3], 0)?;
     let period = box_for_fraction(&bodies, &grains, 0.45)?;
     let start = populate(&grains, &period, 0);
-    let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })?;
+    let packing = pack(
+        &Arrangement::new(&bodies[..], start, period)?,
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )?;
     println!(
         "{} particles at a volume fraction of {:.6} in a box of side {:.3}, none overlap; {} iterations",
         packing.particles().len(),

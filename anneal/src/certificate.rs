@@ -3,17 +3,18 @@
 use crate::difference::Posed;
 use crate::gauge::{Gauge, Search};
 use crate::neighbours::Neighbours;
-use crate::particles::{ParticleError, check, fraction};
 use crate::separating_axis::{best_axis, depth_across_faces};
 use crate::surfaces::{self, Placed, Surface};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::fmt;
-use stereology_shape::{Particle, PeriodicBox, UnitBody};
+use std::ops::Deref;
+use stereology_shape::{Arrangement, Particle, UnitBody};
 
-/// Particles in a periodic box of which it is proved that none overlap, at their true sizes.
+/// An [`Arrangement`] of which it is proved that no particles overlap, at their true sizes.
 ///
-/// Only [`Packing::verify`] makes one, directly or at the end of [`pack`](crate::pack). Positions are in the box.
+/// Only [`Packing::verify`] makes one, directly or at the end of [`pack`](crate::pack). Positions are in the box. It dereferences to its arrangement;
+/// [`Packing::certificate`] summarises the proof.
 ///
 /// # Method
 ///
@@ -29,9 +30,8 @@ use stereology_shape::{Particle, PeriodicBox, UnitBody};
 /// given, not parts or proxies of them) must show such a direction pair by pair, and no piece of either surface may lie inside the other.
 #[derive(Clone, Debug)]
 pub struct Packing {
-    bodies: Vec<UnitBody>,
-    particles: Vec<Particle>,
-    period: PeriodicBox,
+    arrangement: Arrangement,
+    certificate: Certificate,
     energies: Vec<f64>,
     iterations: usize,
 }
@@ -50,7 +50,7 @@ pub struct Overlap {
 }
 
 /// All overlaps of an arrangement that is not a packing.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub struct Overlaps {
     /// The pairs, deepest first; a pair that meets in several periodic images is there several times.
@@ -74,16 +74,23 @@ impl fmt::Display for Overlaps {
     }
 }
 
-/// Why an arrangement is not a packing.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+/// What the proof of a packing examined.
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum VerifyError {
-    /// A particle is not one.
-    #[error(transparent)]
-    Particle(#[from] ParticleError),
-    /// Particles overlap.
-    #[error("{0}")]
-    Overlap(Overlaps),
+pub struct Certificate {
+    /// Pairs of particles and periodic images whose bounding spheres meet; each was shown apart.
+    pub pairs: usize,
+    /// Lower bound of the least distance between the surfaces of such a pair, a length: 0 if particles touch or two bodies that are not convex interlock;
+    /// infinite without pairs.
+    pub least_gap: f64,
+}
+
+impl Deref for Packing {
+    type Target = Arrangement;
+
+    fn deref(&self) -> &Arrangement {
+        &self.arrangement
+    }
 }
 
 impl Packing {
@@ -93,47 +100,40 @@ impl Packing {
     ///
     /// # Errors
     ///
-    /// [`VerifyError::Overlap`] with every pair for which no witness was found; [`VerifyError::Particle`] for shapes that do not exist, sizes, positions and
-    /// orientations that are not numbers, and particles longer than four times the shortest side of the box.
+    /// [`Overlaps`] with every pair for which no witness was found.
     ///
     /// # Examples
     ///
     /// ```
     /// use nalgebra::{Point3, UnitQuaternion, Vector3};
     /// use stereology_anneal::Packing;
-    /// use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     ///
     /// let ball = UnitBody::new(&Body::sphere(1.0)?);
     /// let at = |x| Particle { shape: 0, size: 1.0, category: 0, position: Point3::new(x, 0.0, 0.0), orientation: UnitQuaternion::identity() };
     /// let period = PeriodicBox::new(Vector3::new(4.0, 2.0, 2.0))?;
-    /// let touching = Packing::verify(&[ball.clone()], vec![at(0.0), at(1.0)], &period)?;
-    /// assert!((touching.fraction() - std::f64::consts::PI / 3.0 / 16.0).abs() < 1e-12);
-    /// assert!(Packing::verify(&[ball], vec![at(0.0), at(0.999)], &period).is_err());
+    /// let touching = Arrangement::new([ball], [at(0.0), at(1.0)], period)?;
+    /// let packing = Packing::verify(&touching)?;
+    /// assert!((packing.fraction() - std::f64::consts::PI / 3.0 / 16.0).abs() < 1e-12);
+    /// assert_eq!((packing.certificate().pairs, packing.certificate().least_gap), (1, 0.0));
+    /// assert!(Packing::verify(&touching.with_particles([at(0.0), at(0.999)])?).is_err());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn verify(bodies: &[UnitBody], particles: Vec<Particle>, period: &PeriodicBox) -> Result<Self, VerifyError> {
-        // First, because wrapping would hide positions that are not numbers.
-        check(bodies, &particles, period)?;
-        let particles: Vec<Particle> = particles
-            .into_iter()
-            .map(|p| Particle {
-                position: period.wrap(&p.position),
-                ..p
-            })
-            .collect();
-        let pairs = overlaps(bodies, &particles, period)?;
+    pub fn verify(arrangement: &Arrangement) -> Result<Self, Overlaps> {
+        let arrangement = arrangement.wrapped();
+        let Examined { pairs, certificate } = examine(&arrangement);
         if pairs.is_empty() {
             return Ok(Self {
-                bodies: bodies.to_vec(),
-                particles,
-                period: *period,
+                arrangement,
+                certificate,
                 energies: Vec::new(),
                 iterations: 0,
             });
         }
+        let particles = arrangement.particles();
         let mean = particles.iter().map(|p| p.size).sum::<f64>() / particles.len() as f64;
         let max_overlap = pairs[0].depth / mean;
-        Err(VerifyError::Overlap(Overlaps { pairs, max_overlap }))
+        Err(Overlaps { pairs, max_overlap })
     }
 
     pub(crate) fn with_energies(mut self, energies: Vec<f64>) -> Self {
@@ -147,40 +147,16 @@ impl Packing {
         self
     }
 
-    /// The bodies particles are of.
+    /// The particles and their box, without the proof.
     #[must_use]
-    pub fn bodies(&self) -> &[UnitBody] {
-        &self.bodies
+    pub fn arrangement(&self) -> &Arrangement {
+        &self.arrangement
     }
 
-    /// The particles, in the order they were given.
+    /// What the proof examined, and how near it came to failing.
     #[must_use]
-    pub fn particles(&self) -> &[Particle] {
-        &self.particles
-    }
-
-    /// The particles, without the proof.
-    #[must_use]
-    pub fn into_particles(self) -> Vec<Particle> {
-        self.particles
-    }
-
-    /// The box that repeats.
-    #[must_use]
-    pub fn period(&self) -> &PeriodicBox {
-        &self.period
-    }
-
-    /// Sides of the box along x, y, z.
-    #[must_use]
-    pub fn sides(&self) -> Vector3<f64> {
-        self.period.sides()
-    }
-
-    /// Volume of the particles over that of the box.
-    #[must_use]
-    pub fn fraction(&self) -> f64 {
-        fraction(&self.bodies, &self.particles, &self.period)
+    pub fn certificate(&self) -> &Certificate {
+        &self.certificate
     }
 
     /// The deepest overlap over the mean size: 0, by the certificate.
@@ -206,30 +182,53 @@ impl Packing {
 
 /// All pairs of particles that cannot be shown apart, deepest first: what [`Packing::verify`] finds.
 ///
-/// # Errors
-///
-/// [`ParticleError`], as there.
-///
 /// # Examples
 ///
 /// ```
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
-/// use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+/// use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 ///
 /// // A sphere of diameter 1 in a box of side 0.8 meets its six nearest images: three pairs.
 /// let ball = UnitBody::new(&Body::sphere(1.0)?);
 /// let only = Particle { shape: 0, size: 1.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
-/// let found = stereology_anneal::overlaps(&[ball], &[only], &PeriodicBox::new(Vector3::repeat(0.8))?)?;
+/// let found = stereology_anneal::overlaps(&Arrangement::new([ball], [only], PeriodicBox::new(Vector3::repeat(0.8))?)?);
 /// assert_eq!(found.len(), 3);
 /// assert!((found[0].depth - 0.2).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn overlaps(
-    bodies: &[UnitBody],
-    particles: &[Particle],
-    period: &PeriodicBox,
-) -> Result<Vec<Overlap>, ParticleError> {
-    check(bodies, particles, period)?;
+#[must_use]
+pub fn overlaps(arrangement: &Arrangement) -> Vec<Overlap> {
+    examine(arrangement).pairs
+}
+
+/// The overlapping pairs of an arrangement, deepest first, and what was examined of the others.
+struct Examined {
+    pairs: Vec<Overlap>,
+    certificate: Certificate,
+}
+
+impl Examined {
+    fn nothing() -> Self {
+        Self {
+            pairs: Vec::new(),
+            certificate: Certificate {
+                pairs: 0,
+                least_gap: f64::INFINITY,
+            },
+        }
+    }
+
+    /// Neither the count nor the least gap depends on the order of the parts; the pairs are sorted afterwards.
+    fn joined(mut self, other: Self) -> Self {
+        self.pairs.extend(other.pairs);
+        self.certificate.pairs += other.certificate.pairs;
+        self.certificate.least_gap = self.certificate.least_gap.min(other.certificate.least_gap);
+        self
+    }
+}
+
+fn examine(arrangement: &Arrangement) -> Examined {
+    let (bodies, particles, period) = (arrangement.bodies(), arrangement.particles(), arrangement.period());
     let centres: Vec<Vector3<f64>> = particles.iter().map(|p| period.wrap(&p.position).coords).collect();
     let reach: Vec<f64> = particles
         .iter()
@@ -243,36 +242,41 @@ pub fn overlaps(
     // The skin makes up for the rounding of the reach.
     let skin = 1e-9 * reach.iter().copied().fold(0.0, f64::max);
     let neighbours = Neighbours::find(&centres, &reach, period.sides(), skin);
-    let mut found: Vec<Overlap> = (0..particles.len())
+    let placed = |i: usize| Placed {
+        body: &bodies[particles[i].shape],
+        surface: surfaces[particles[i].shape].as_ref(),
+        size: particles[i].size,
+        rotation: &turns[i],
+    };
+    let mut found = (0..particles.len())
         .into_par_iter()
         .with_min_len(64)
-        .flat_map_iter(|first| {
-            let (centres, turns, neighbours, surfaces) = (&centres, &turns, &neighbours, &surfaces);
-            neighbours.of(first).1.iter().filter_map(move |neighbour| {
+        .fold(Examined::nothing, |mut found, first| {
+            for neighbour in neighbours.of(first).1 {
                 let second = neighbour.other as usize;
                 let offset = centres[second] + neighbours.images.shift(neighbour.image) - centres[first];
-                let placed = |i: usize| Placed {
-                    body: &bodies[particles[i].shape],
-                    surface: surfaces[particles[i].shape].as_ref(),
-                    size: particles[i].size,
-                    rotation: &turns[i],
-                };
-                let depth = depth(&placed(first), &placed(second), &offset);
-                (depth > 0.0).then_some(Overlap {
-                    first: first.min(second),
-                    second: first.max(second),
-                    depth,
-                })
-            })
+                found.certificate.pairs += 1;
+                match separation(&placed(first), &placed(second), &offset) {
+                    Separation::Apart { gap } => {
+                        found.certificate.least_gap = found.certificate.least_gap.min(gap);
+                    }
+                    Separation::Overlap { depth } => found.pairs.push(Overlap {
+                        first: first.min(second),
+                        second: first.max(second),
+                        depth,
+                    }),
+                }
+            }
+            found
         })
-        .collect();
-    found.sort_by(|p, q| {
+        .reduce(Examined::nothing, Examined::joined);
+    found.pairs.sort_by(|p, q| {
         q.depth
             .total_cmp(&p.depth)
             .then(p.first.cmp(&q.first))
             .then(p.second.cmp(&q.second))
     });
-    Ok(found)
+    found
 }
 
 /// Allowance for the rounding of coordinates and support points.
@@ -287,15 +291,26 @@ fn surfaces_needed(bodies: &[UnitBody], particles: &[Particle]) -> Vec<Option<Su
         .collect()
 }
 
-/// 0 if a witness shows two bodies apart, else how deep they overlap.
-fn depth(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> f64 {
+/// How two bodies lie to each other.
+enum Separation {
+    /// A witness shows them apart, by at least this length.
+    Apart { gap: f64 },
+    /// No witness was found; how deep they overlap.
+    Overlap { depth: f64 },
+}
+
+fn separation(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> Separation {
     if a.is_sphere() && b.is_sphere() {
         let touching = 0.5 * (a.size + b.size);
         let distance = offset.norm();
         return if distance >= touching * (1.0 - ROUNDING) {
-            0.0
+            Separation::Apart {
+                gap: (distance - touching).max(0.0),
+            }
         } else {
-            touching - distance
+            Separation::Overlap {
+                depth: touching - distance,
+            }
         };
     }
     let convex = a.body.is_convex() && b.body.is_convex();
@@ -306,30 +321,40 @@ fn depth(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> f64 {
         steps: 200,
     };
     let gauge = Gauge::search(&hull_a, &hull_b, offset, &search);
-    if witnessed(&hull_a, &hull_b, offset, &gauge.normal) {
-        return 0.0;
+    if let Some(gap) = witnessed(&hull_a, &hull_b, offset, &gauge.normal) {
+        return Separation::Apart { gap };
     }
     if !convex {
         // Hulls that meet prove nothing.
-        return surfaces::depth(a, b, offset);
+        let depth = surfaces::depth(a, b, offset);
+        return if depth > 0.0 {
+            Separation::Overlap { depth }
+        } else {
+            Separation::Apart { gap: 0.0 }
+        };
     }
     let mut value = gauge.value;
     if gauge.at_most >= 1.0 - 1e-9
         && let Some((quotient, axis)) = best_axis(&hull_a, &hull_b, offset)
     {
         // The search ended on a degenerate portal, or too near to touching to tell.
-        if witnessed(&hull_a, &hull_b, offset, &axis) {
-            return 0.0;
+        if let Some(gap) = witnessed(&hull_a, &hull_b, offset, &axis) {
+            return Separation::Apart { gap };
         }
         value = value.max(quotient);
     }
     let depth = (1.0 - value) * gauge.width;
-    depth_across_faces(&hull_a, &hull_b, offset)
+    let depth = depth_across_faces(&hull_a, &hull_b, offset)
         .map_or(depth, |across| across.min(depth))
-        .max(f64::MIN_POSITIVE)
+        .max(f64::MIN_POSITIVE);
+    Separation::Overlap { depth }
 }
 
-/// Whether the bodies lie apart in a direction, computed from their support points in world axes and nothing else.
-fn witnessed(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>, normal: &Vector3<f64>) -> bool {
-    *normal != Vector3::zeros() && (a.reach(normal) + b.reach(&-normal)) * (1.0 - ROUNDING) <= normal.dot(offset)
+/// How far the bodies lie apart in a direction at least, `None` if they do not; computed from their support points in world axes and nothing else.
+fn witnessed(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>, normal: &Vector3<f64>) -> Option<f64> {
+    if *normal == Vector3::zeros() {
+        return None;
+    }
+    let (reach, distance) = (a.reach(normal) + b.reach(&-normal), normal.dot(offset));
+    (reach * (1.0 - ROUNDING) <= distance).then(|| ((distance - reach) / normal.norm()).max(0.0))
 }

@@ -1,7 +1,7 @@
 //! Packings in equilibrium: random moves of hard bodies, none of which may overlap.
 
 use crate::assembly::Assembly;
-use crate::certificate::{Packing, VerifyError};
+use crate::certificate::Packing;
 use crate::one_by_one::{OneByOne, in_ball};
 use crate::pack::PackError;
 use crate::proxies::{Proxy, StandIn};
@@ -28,12 +28,13 @@ const STREAM: u64 = 23;
 /// ```
 /// use std::ops::ControlFlow;
 /// use stereology_anneal::{PackOptions, box_for_fraction, equilibrate, mix, pack, populate};
-/// use stereology_shape::{Body, UnitBody};
+/// use stereology_shape::{Arrangement, Body, UnitBody};
 ///
 /// let spheres = [UnitBody::new(&Body::sphere(1.0)?)];
 /// let grains = mix(&[1.0; 100], &[1.0], 0)?;
 /// let period = box_for_fraction(&spheres, &grains, 0.3)?;
-/// let packing = pack(&spheres, populate(&grains, &period, 0), &period, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// let start = Arrangement::new(spheres, populate(&grains, &period, 0), period)?;
+/// let packing = pack(&start, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
 /// let later = equilibrate(&packing, 20, 0, &|_| ControlFlow::Continue(()))?;
 /// assert!((later.fraction() - 0.3).abs() < 1e-12 && later.particles() != packing.particles());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -86,10 +87,6 @@ pub fn equilibrate(packing: &Packing, sweeps: usize, seed: u64, progress: Progre
         angle = (angle * factor).min(1.0);
     }
     let particles = assembly.into_particles(&period);
-    match Packing::verify(packing.bodies(), particles, &period) {
-        Ok(packing) => Ok(packing),
-        Err(VerifyError::Particle(error)) => Err(error.into()),
-        // No accepted move overlaps, so nothing can; if rounding thinks otherwise, the packing stays as it was.
-        Err(VerifyError::Overlap(_)) => Ok(packing.clone()),
-    }
+    // No accepted move overlaps, so nothing can; if rounding thinks otherwise, the packing stays as it was.
+    Ok(Packing::verify(&packing.with_particles(particles)?).unwrap_or_else(|_| packing.clone()))
 }

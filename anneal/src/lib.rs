@@ -18,12 +18,13 @@
 //! ```
 //! use std::ops::ControlFlow;
 //! use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
-//! use stereology_shape::{Body, UnitBody};
+//! use stereology_shape::{Arrangement, Body, UnitBody};
 //!
 //! let bodies = [UnitBody::new(&Body::sphere(1.0)?)];
 //! let grains = mix(&lognormal_sizes(1000, 0.3, 0)?, &[1.0], 0)?;
 //! let period = box_for_fraction(&bodies, &grains, 0.5)?;
-//! let packing = pack(&bodies, populate(&grains, &period, 0), &period, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
+//! let start = Arrangement::new(bodies, populate(&grains, &period, 0), period)?;
+//! let packing = pack(&start, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
 //! assert!((packing.fraction() - 0.5).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -33,14 +34,14 @@
 //! ```
 //! use nalgebra::{Point3, UnitQuaternion, Vector3};
 //! use stereology_anneal::Packing;
-//! use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+//! use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 //!
 //! let cube = UnitBody::new(&Body::cuboid([1.0, 1.0, 1.0])?);
 //! let size = cube.body().size(); // of edge 1
 //! let at = |x, y, z| Particle { shape: 0, size, category: 0, position: Point3::new(x, y, z), orientation: UnitQuaternion::identity() };
 //! // Eight cubes that fill a box of side 2 touch everywhere and overlap nowhere.
-//! let corners = (0..8).map(|k| at(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
-//! let packing = Packing::verify(&[cube], corners, &PeriodicBox::new(Vector3::repeat(2.0))?)?;
+//! let corners: Vec<_> = (0..8).map(|k| at(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
+//! let packing = Packing::verify(&Arrangement::new([cube], corners, PeriodicBox::new(Vector3::repeat(2.0))?)?)?;
 //! assert!((packing.fraction() - 1.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -68,7 +69,6 @@ mod options;
 mod order;
 mod pack;
 mod paper;
-mod particles;
 mod population;
 mod proxies;
 mod radial;
@@ -77,7 +77,7 @@ mod separating_axis;
 mod sequential;
 mod surfaces;
 
-pub use certificate::{Overlap, Overlaps, Packing, VerifyError, overlaps};
+pub use certificate::{Certificate, Overlap, Overlaps, Packing, overlaps};
 pub use convex_parts::ConvexParts;
 pub use densities::{SizeDensities, SizeInBin, counts_from_densities, grains_from_densities};
 pub use density_limit::density_limit;
@@ -85,7 +85,6 @@ pub use equilibrium::equilibrate;
 pub use options::{Mode, PackOptions};
 pub use order::{BondOrder, OrientationTensor, bond_order, orientation_tensor};
 pub use pack::{Jam, PackError, Unresolved, pack};
-pub use particles::ParticleError;
 pub use population::{
     Grain, PopulationError, box_for_fraction, count_to_fill, lognormal_sizes, mix, populate, scale_to_fraction,
     total_volume,

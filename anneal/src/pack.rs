@@ -2,27 +2,26 @@
 
 use crate::annealing;
 use crate::assembly::{Assembly, SWELLING_MOST};
-use crate::certificate::{Overlaps, Packing, VerifyError};
+use crate::certificate::{Overlaps, Packing};
 use crate::contacts::{Memory, Overlaps as Pushes};
 use crate::damped::{self, End, Limits};
 use crate::density_limit::density_limit;
 use crate::options::{Mode, PackOptions};
 use crate::paper;
-use crate::particles::{ParticleError, check, fraction};
 use crate::proxies::StandIn;
 use crate::sequential::{self, Filling};
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use stereology_metrics::Progress;
-use stereology_shape::{Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Arrangement, ArrangementError, Particle, PeriodicBox};
 
 /// Why there is no packing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackError {
-    /// A particle is not one.
+    /// A particle is not valid.
     #[error(transparent)]
-    Particle(#[from] ParticleError),
+    Arrangement(#[from] ArrangementError),
     /// A particle cannot but overlap its own image.
     #[error(
         "particle {index} holds a ball of diameter {diameter}, wider than the box ({side}), so it overlaps its own periodic image: take a larger box"
@@ -125,40 +124,34 @@ pub struct Jam {
 ///
 /// # Errors
 ///
-/// [`PackError::Unresolved`] with what remains, if particles jam; [`PackError::Jammed`] if one finds no place; [`PackError::TooDense`], [`PackError::TooWide`] and
-/// [`PackError::Particle`] before anything is done; [`PackError::Cancelled`].
+/// [`PackError::Unresolved`] with what remains, if particles jam; [`PackError::Jammed`] if one finds no place; [`PackError::TooDense`] and
+/// [`PackError::TooWide`] before anything is done; [`PackError::Cancelled`].
 ///
 /// # Examples
 ///
 /// ```
 /// use std::ops::ControlFlow;
 /// use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
-/// use stereology_shape::{Body, UnitBody};
+/// use stereology_shape::{Arrangement, Body, UnitBody};
 ///
 /// let bodies = [UnitBody::new(&Body::sphere(1.0)?), UnitBody::new(&Body::rock(1))];
 /// let grains = mix(&lognormal_sizes(100, 0.3, 7)?, &[0.5, 0.5], 7)?;
 /// let period = box_for_fraction(&bodies, &grains, 0.4)?;
-/// let particles = populate(&grains, &period, 7);
-/// let packing = pack(&bodies, particles, &period, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// let start = Arrangement::new(bodies, populate(&grains, &period, 7), period)?;
+/// let packing = pack(&start, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
 /// assert!((packing.fraction() - 0.4).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn pack(
-    bodies: &[UnitBody],
-    particles: Vec<Particle>,
-    period: &PeriodicBox,
-    options: &PackOptions,
-    progress: Progress<'_>,
-) -> Result<Packing, PackError> {
-    check(bodies, &particles, period)?;
-    let fraction = refuse_the_impossible(bodies, &particles, period)?;
+pub fn pack(arrangement: &Arrangement, options: &PackOptions, progress: Progress<'_>) -> Result<Packing, PackError> {
+    let (bodies, particles, period) = (arrangement.bodies(), arrangement.particles(), arrangement.period());
+    let fraction = refuse_the_impossible(arrangement)?;
     check_options(options)?;
     let stand_ins: Vec<StandIn> = bodies
         .iter()
         .map(|body| StandIn::of(body, options.proxy, options.tolerance))
         .collect();
     // Neighbours in space are neighbours in memory.
-    let order = along_a_curve(&particles, period);
+    let order = along_a_curve(particles, period);
     let particles = order.iter().map(|&i| particles[i]).collect();
     let mut assembly = Assembly::new(bodies, &stand_ins, particles, period);
     let trace = match options.mode {
@@ -166,7 +159,7 @@ pub fn pack(
             Filling::Complete { tries } => Trace::Tries(tries),
             Filling::Cancelled => return Err(PackError::Cancelled),
             Filling::Jammed { placed, next } => {
-                return Err(jammed(assembly, bodies, period, &placed, next, tries, fraction));
+                return Err(jammed(assembly, arrangement, &placed, next, tries, fraction));
             }
         },
         Mode::Fast { iterations, .. } | Mode::Paper { iterations, .. } | Mode::Anneal { iterations, .. } => {
@@ -183,7 +176,7 @@ pub fn pack(
     for (particle, i) in moved.into_iter().zip(order) {
         particles[i] = particle;
     }
-    match Packing::verify(bodies, particles.clone(), period) {
+    match Packing::verify(&arrangement.with_particles(particles.as_slice())?) {
         Ok(packing) => {
             // Nothing is left to cancel; a caller who breaks now has the packing all the same.
             let _ = progress(1.0);
@@ -192,8 +185,7 @@ pub fn pack(
                 Trace::Energies(energies) => packing.with_energies(energies),
             })
         }
-        Err(VerifyError::Particle(error)) => Err(error.into()),
-        Err(VerifyError::Overlap(overlaps)) => {
+        Err(overlaps) => {
             let energies = match trace {
                 Trace::Tries(_) => Vec::new(),
                 Trace::Energies(energies) => energies,
@@ -257,36 +249,39 @@ fn relax(
 /// The error of sequential addition: `placed` have a position, `next` found none.
 fn jammed(
     assembly: Assembly<'_>,
-    bodies: &[UnitBody],
-    period: &PeriodicBox,
+    arrangement: &Arrangement,
     placed: &[usize],
     next: usize,
     tries: usize,
-    requested: f64,
+    fraction: f64,
 ) -> PackError {
-    let particles = assembly.into_particles(period);
+    let particles = assembly.into_particles(arrangement.period());
     let placed: Vec<Particle> = placed.iter().map(|&i| particles[i]).collect();
+    let reached = match arrangement.with_particles(placed.as_slice()) {
+        Ok(placed) => placed.fraction(),
+        Err(error) => return error.into(),
+    };
     PackError::Jammed(Box::new(Jam {
-        reached: fraction(bodies, &placed, period),
+        reached,
         placed,
         count: particles.len(),
         size: particles[next].size,
         tries,
-        fraction: requested,
+        fraction,
     }))
 }
 
-fn refuse_the_impossible(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<f64, PackError> {
-    let side = period.sides().min();
-    for (index, particle) in particles.iter().enumerate() {
-        let body = &bodies[particle.shape];
+fn refuse_the_impossible(arrangement: &Arrangement) -> Result<f64, PackError> {
+    let side = arrangement.sides().min();
+    for (index, particle) in arrangement.particles().iter().enumerate() {
+        let body = &arrangement.bodies()[particle.shape];
         let diameter = 2.0 * body.inscribed_radius() * particle.size;
         if diameter > side {
             return Err(PackError::TooWide { index, diameter, side });
         }
     }
-    let fraction = fraction(bodies, particles, period);
-    let limit = density_limit(bodies, particles);
+    let fraction = arrangement.fraction();
+    let limit = density_limit(arrangement.bodies(), arrangement.particles());
     if fraction > limit {
         Err(PackError::TooDense { fraction, limit })
     } else {

@@ -44,12 +44,13 @@ const STREAM: u64 = 24;
 /// ```
 /// use std::ops::ControlFlow;
 /// use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate, section_test};
-/// use stereology_shape::{Body, UnitBody};
+/// use stereology_shape::{Arrangement, Body, UnitBody};
 ///
 /// let spheres = [UnitBody::new(&Body::sphere(1.0)?)];
 /// let grains = mix(&lognormal_sizes(300, 0.3, 0)?, &[1.0], 0)?;
 /// let period = box_for_fraction(&spheres, &grains, 0.5)?;
-/// let packing = pack(&spheres, populate(&grains, &period, 0), &period, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// let start = Arrangement::new(spheres, populate(&grains, &period, 0), period)?;
+/// let packing = pack(&start, &PackOptions::default(), &|_| ControlFlow::Continue(()))?;
 /// let test = section_test(&packing, 5, 50, 0);
 /// assert!(test.p_value > 1e-3);
 /// assert!((test.profiles_per_area / test.expected_per_area - 1.0).abs() < 0.1);

@@ -6,7 +6,7 @@
 //! - its `size`: the diameter of the circle with the area A of its largest section, √(4 A / π), found by maximisation;
 //! - the profiles of a section: disjoint outlines with their holes, because one particle may show several;
 //! - as a [`UnitBody`] (centroid at the origin, size 1): inside, support, signed distance, in nanoseconds;
-//! - as a [`Particle`]: scaled, turned and moved, world = position + size · R u, in a [`PeriodicBox`].
+//! - as a [`Particle`]: scaled, turned and moved, world = position + size · R u, in a [`PeriodicBox`]; an [`Arrangement`] holds particles that were checked.
 //!
 //! Decisions that rounding could spoil (which side of a plane, inside or outside) are exact signs of determinants; measures are sums in
 //! double precision. Nothing is mended in silence: [`ClosedMesh::repairs`] lists it.
@@ -38,6 +38,7 @@
 //! assert!(!rock.contains(&particle.to_local(&Point3::new(9.0, 5.0, 5.0))));
 //! ```
 
+mod arrangement;
 mod body;
 mod chord;
 mod closed_mesh;
@@ -86,6 +87,7 @@ mod triangle_mesh;
 mod unit_body;
 mod winding;
 
+pub use arrangement::{Arrangement, ArrangementError};
 pub use body::{Body, BodyError, BodyKind};
 pub use chord::{Chord, Chords};
 pub use closed_mesh::{ClosedMesh, MeshError, Repair};

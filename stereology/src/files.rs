@@ -11,7 +11,9 @@ use std::io::{self, BufReader, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use stereology_grid::{Format, GridError, VolumeShape, read_npy, write_atomically, write_volume};
-use stereology_shape::{Body, BodyError, BoxError, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
+use stereology_shape::{
+    Arrangement, Body, BodyError, BoxError, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody,
+};
 use stereology_unfold::Unfolding;
 use stereology_volume::{Residual, Solid, SolidError};
 
@@ -101,7 +103,7 @@ impl PackingFile {
     ///
     /// ```
     /// use stereology::files::PackingFile;
-    /// use stereology::shape::{Particle, PeriodicBox};
+    /// use stereology::shape::{Arrangement, Particle, PeriodicBox};
     ///
     /// let particle = Particle { shape: 0, size: 1.0, category: 0, position: nalgebra::Point3::origin(), orientation: nalgebra::UnitQuaternion::identity() };
     /// let file = PackingFile::new(vec!["sphere".to_owned()], &[particle], &PeriodicBox::new(nalgebra::Vector3::repeat(4.0))?);
@@ -235,7 +237,7 @@ const SOLID_SCHEMA: &str = "stereology.solid/1";
 /// use stereology::files::{open_solid, save_solid};
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use stereology::pipeline::ParticleTypes;
-/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::shape::{Arrangement, Particle, PeriodicBox};
 /// use stereology::volume::{Residual, Solid};
 ///
 /// // A sphere of diameter 40 in a box of side 64.
@@ -243,7 +245,7 @@ const SOLID_SCHEMA: &str = "stereology.solid/1";
 /// let particle = Particle { shape: 0, size: 40.0, category: 0, position: Point3::new(32.0, 32.0, 32.0), orientation: UnitQuaternion::identity() };
 /// let period = PeriodicBox::new(Vector3::repeat(64.0))?;
 /// let residual = Residual { binder: ndarray::Array4::zeros([8, 8, 8, 3]), particles: ndarray::Array4::zeros([8, 8, 8, 3]), voxel: 8.0 };
-/// let solid = Solid::new(spheres.unit_bodies(), vec![particle], vec![[0.7, 0.3, 0.2]], period, [0.8; 3], Some(residual.clone()))?;
+/// let solid = Solid::new(Arrangement::new(spheres.unit_bodies(), vec![particle], period)?, vec![[0.7, 0.3, 0.2]], [0.8; 3], Some(residual.clone()))?;
 /// let folder = tempfile::tempdir()?;
 /// save_solid(folder.path(), &solid, &residual, &spheres)?;
 /// let opened = open_solid(folder.path())?;
@@ -345,7 +347,9 @@ pub fn open_solid(folder: impl AsRef<Path>) -> Result<SavedSolid, FileError> {
         })
         .collect::<Result<Vec<_>, BodyError>>()
         .map_err(|error| FileError::value(&packing_path, error))?;
-    let solid = Solid::new(bodies, particles, file.colours, period, file.binder, Some(residual))
+    let arrangement =
+        Arrangement::new(bodies, particles, period).map_err(|error| FileError::value(&packing_path, error))?;
+    let solid = Solid::new(arrangement, file.colours, file.binder, Some(residual))
         .and_then(|solid| solid.with_voids(&file.voids))
         .map_err(|error: SolidError| FileError::value(folder, error))?;
     Ok(SavedSolid {

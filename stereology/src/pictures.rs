@@ -23,12 +23,12 @@ use stereology_volume::Solid;
 /// use std::ops::ControlFlow;
 /// use stereology::pictures::picture_of_solid;
 /// use stereology::render::{Camera, RenderOptions};
-/// use stereology::shape::{Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
+/// use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
 /// use stereology::volume::Solid;
 ///
 /// let ball = UnitBody::new(&Body::sphere(1.0)?);
 /// let bubble = Particle { shape: 0, size: 3.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
-/// let foam = Solid::new(vec![ball], vec![bubble], vec![[0.5; 3]], PeriodicBox::new(Vector3::repeat(5.0))?, [0.9, 0.8, 0.5], None)?.with_voids(&[0])?;
+/// let foam = Solid::new(Arrangement::new(vec![ball], vec![bubble], PeriodicBox::new(Vector3::repeat(5.0))?)?, vec![[0.5; 3]], [0.9, 0.8, 0.5], None)?.with_voids(&[0])?;
 /// let block = TriangleMesh::cuboid([5.0; 3]);
 /// let options = RenderOptions::default().with_size(60, 60);
 /// let picture = picture_of_solid(&foam, &block, &|p| *p, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
@@ -67,11 +67,11 @@ pub fn picture_of_solid(
 /// use stereology::anneal::Packing;
 /// use stereology::pictures::picture_of_packing;
 /// use stereology::render::RenderOptions;
-/// use stereology::shape::{Body, Particle, PeriodicBox, UnitBody};
+/// use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 ///
 /// let ball = UnitBody::new(&Body::sphere(1.0)?);
 /// let at = |x| Particle { shape: 0, size: 1.0, category: 0, position: Point3::new(x, 1.0, 1.0), orientation: UnitQuaternion::identity() };
-/// let packing = Packing::verify(&[ball], vec![at(0.5), at(2.0)], &PeriodicBox::new(Vector3::new(3.0, 2.0, 2.0))?)?;
+/// let packing = Packing::verify(&Arrangement::new([ball], vec![at(0.5), at(2.0)], PeriodicBox::new(Vector3::new(3.0, 2.0, 2.0))?)?)?;
 /// let colours = [[0.8, 0.3, 0.2], [0.2, 0.3, 0.8]];
 /// let picture = picture_of_packing(&packing, &|i| colours[i], &RenderOptions::default().with_size(80, 60))?;
 /// assert_eq!(picture.dimensions(), (80, 60));

@@ -7,7 +7,7 @@ use ndarray::{Array3, Array4};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology_volume::{Axis, Residual, SlicePlane, Solid};
 
 /// Rocks on a jittered lattice, a fifth of them overlapping a little: as many to search as in a packing.
@@ -38,7 +38,13 @@ fn rocks(n: u32) -> Solid {
         voxel: 1.0,
     };
     let period = PeriodicBox::new(Vector3::repeat(side)).expect("a box");
-    Solid::new(bodies, particles, colours, period, [0.5; 3], Some(residual)).expect("a solid")
+    Solid::new(
+        Arrangement::new(bodies, particles, period).expect("particles"),
+        colours,
+        [0.5; 3],
+        Some(residual),
+    )
+    .expect("a solid")
 }
 
 fn points() -> Vec<Point3<f64>> {

@@ -6,7 +6,7 @@
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology_volume::{Axis, SlicePlane, Solid};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -36,7 +36,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .map(|p| tones[p.shape].map(|v| v + 0.1 * rng.random::<f32>()))
         .collect();
     let bodies = [1, 2].map(|seed| UnitBody::new(&Body::rock(seed))).to_vec();
-    let solid = Solid::new(bodies, particles, colours, period, [0.86, 0.84, 0.8], None)?;
+    let solid = Solid::new(
+        Arrangement::new(bodies, particles, period)?,
+        colours,
+        [0.86, 0.84, 0.8],
+        None,
+    )?;
 
     let profiles = solid.section_profiles(Axis::Z, 40.0);
     let area: f64 = profiles.iter().map(|(_, area)| area).sum();

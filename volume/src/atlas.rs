@@ -66,13 +66,13 @@ impl Solid {
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
     /// # use std::ops::ControlFlow;
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// use stereology_shape::TriangleMesh;
     /// use stereology_volume::{BakeOptions, Solid};
     /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
     /// // The six faces of a cube, a third of the picture each way.
     /// let cube = TriangleMesh::cuboid([5.0, 5.0, 5.0]);
     /// let options = BakeOptions { pixels: 96, ..BakeOptions::default() };

@@ -109,13 +109,13 @@ impl Solid {
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
     /// # use std::ops::ControlFlow;
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// use stereology_shape::TriangleMesh;
     /// use stereology_volume::{CarveOptions, Solid};
     /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
     /// // A cube of 12 triangles through a red sphere: fine where the sphere ends.
     /// let cube = TriangleMesh::cuboid([5.0, 5.0, 5.0]);
     /// let carved = solid.carve(&cube, &|p| p + Vector3::repeat(5.0), &CarveOptions::default(), &|_| ControlFlow::Continue(()))?;

@@ -17,7 +17,7 @@
 //!
 //! ```
 //! use nalgebra::{Point3, UnitQuaternion, Vector3};
-//! use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+//! use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 //! use stereology_volume::{Axis, SlicePlane, Solid};
 //!
 //! let rock = UnitBody::new(&Body::rock(1));
@@ -27,7 +27,7 @@
 //! let particles = vec![at(2.0, 2.0, 2.0), at(6.0, 6.0, 3.0)];
 //! let colours = vec![[0.7, 0.3, 0.2], [0.2, 0.3, 0.7]];
 //! let period = PeriodicBox::new(Vector3::repeat(8.0))?;
-//! let solid = Solid::new(vec![rock], particles, colours, period, [0.8, 0.8, 0.75], None)?;
+//! let solid = Solid::new(Arrangement::new(vec![rock], particles, period)?, colours, [0.8, 0.8, 0.75], None)?;
 //!
 //! let picture = solid.slice(&SlicePlane::across(Axis::Z, 2.5), 200, 200, 8.0 / 200.0)?;
 //! assert_eq!(picture.get_pixel(50, 50).0, [179, 77, 51]);
@@ -38,12 +38,12 @@
 //!
 //! ```
 //! # use nalgebra::{Point3, UnitQuaternion, Vector3};
-//! # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+//! # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 //! # use stereology_volume::{Axis, Solid};
 //! # let sphere = UnitBody::new(&Body::sphere(1.0)?);
 //! # let particle = Particle { shape: 0, size: 3.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
 //! # let period = PeriodicBox::new(Vector3::repeat(8.0))?;
-//! # let solid = Solid::new(vec![sphere], vec![particle], vec![[0.5; 3]], period, [0.5; 3], None)?;
+//! # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[0.5; 3]], [0.5; 3], None)?;
 //! let depths = (0..1000).map(|i| (f64::from(i) + 0.5) * 8.0 / 1000.0);
 //! let areas: f64 = depths.flat_map(|z| solid.section_profiles(Axis::Z, z)).map(|(_, area)| area).sum();
 //! let area_fraction = areas / (1000.0 * 8.0 * 8.0);

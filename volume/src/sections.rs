@@ -46,12 +46,12 @@ impl Solid {
     ///
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// # use stereology_volume::{Axis, Solid};
     /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(9.0, 5.0, 9.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
     /// // A sphere of diameter 6 about z = 9, cut 2 units off its centre by its image's side: π (3² − 2²).
     /// let profiles = solid.section_profiles(Axis::Z, 1.0);
     /// assert_eq!(profiles.len(), 1);

@@ -110,12 +110,12 @@ impl Solid {
     ///
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// # use stereology_volume::{Axis, SlicePlane, Solid};
     /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
     /// let picture = solid.slice(&SlicePlane::across(Axis::Z, 5.0), 100, 100, 0.1)?;
     /// assert_eq!(picture.get_pixel(50, 50).0, [255, 0, 0]);
     /// assert_eq!(picture.get_pixel(10, 10).0, [0, 0, 0]);

@@ -10,7 +10,7 @@ use ndarray::Array4;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
-use stereology_shape::{Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Arrangement, Particle, PeriodicBox, UnitBody};
 
 /// A particle may be this many times the shortest side of the box across, its own images overlapping then: a guard against sizes and boxes of different units.
 const LARGEST_PARTICLE: f64 = 2.0;
@@ -29,14 +29,14 @@ const PERIOD_TOLERANCE: f64 = 1e-6;
 ///
 /// ```
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
-/// use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+/// use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 /// use stereology_volume::Solid;
 ///
 /// let sphere = UnitBody::new(&Body::sphere(1.0)?);
 /// let particle =
 ///     Particle { shape: 0, size: 4.0, category: 2, position: Point3::origin(), orientation: UnitQuaternion::identity() };
 /// let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-/// let solid = Solid::new(vec![sphere], vec![particle], vec![[0.8, 0.2, 0.1]], period, [0.5; 3], None)?;
+/// let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[0.8, 0.2, 0.1]], [0.5; 3], None)?;
 ///
 /// assert_eq!(solid.id_at(&Point3::new(0.0, 0.0, 1.9)), Some(0));
 /// assert_eq!(solid.id_at(&Point3::new(0.0, 0.0, 8.1)), Some(0)); // its image
@@ -47,10 +47,8 @@ const PERIOD_TOLERANCE: f64 = 1e-6;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Solid {
-    bodies: Arc<[UnitBody]>,
-    particles: Arc<[Particle]>,
+    arrangement: Arrangement,
     colours: Arc<[[f32; 3]]>,
-    period: PeriodicBox,
     binder: [f32; 3],
     cells: Arc<Cells>,
     residual: Option<Arc<Fields>>,
@@ -70,26 +68,6 @@ struct Fields {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolidError {
-    /// A particle names a body that is not there.
-    #[error("particle {particle} is of shape {shape}, but there are {bodies} shapes")]
-    Shape {
-        /// Index of the particle.
-        particle: usize,
-        /// The shape it names.
-        shape: usize,
-        /// Number of bodies given.
-        bodies: usize,
-    },
-    /// A particle's size, position or orientation is no finite number, or its size not positive.
-    #[error("particle {particle} has size {size} and position {position:?}; both must be finite and the size positive")]
-    Particle {
-        /// Index of the particle.
-        particle: usize,
-        /// Its size.
-        size: f64,
-        /// Its position.
-        position: [f64; 3],
-    },
     /// A particle is far larger than the box.
     #[error(
         "particle {particle} of size {size} is more than {LARGEST_PARTICLE} times the box's shortest side of {side}; are both in the same unit?"
@@ -109,12 +87,6 @@ pub enum SolidError {
     Crowded {
         /// Volume of the balls over that of the box.
         times: f64,
-    },
-    /// More particles than can be numbered.
-    #[error("{particles} particles are more than 2^31; make the box smaller")]
-    TooMany {
-        /// Number of particles.
-        particles: usize,
     },
     /// Category 255 has no number left in the exported channel, where 0 is the binder.
     #[error("particle {particle} is of category 255; categories go from 0 to 254")]
@@ -198,25 +170,25 @@ impl Solid {
     ///
     /// [`SolidError`] says which particle, colour or residual does not fit, and why.
     pub fn new(
-        bodies: Vec<UnitBody>,
-        particles: Vec<Particle>,
+        arrangement: Arrangement,
         colours: Vec<[f32; 3]>,
-        period: PeriodicBox,
         binder: [f32; 3],
         residual: Option<Residual>,
     ) -> Result<Self, SolidError> {
-        check_particles(&bodies, &particles, &period)?;
-        check_colours(&colours, &particles, binder)?;
+        check_particles(&arrangement)?;
+        check_colours(&colours, arrangement.particles().len(), binder)?;
         let (residual, cells) = rayon::join(
-            || residual.map(|residual| Fields::new(residual, &period)).transpose(),
-            || Cells::new(&bodies, &particles, &period),
+            || {
+                residual
+                    .map(|residual| Fields::new(residual, arrangement.period()))
+                    .transpose()
+            },
+            || Cells::new(arrangement.bodies(), arrangement.particles(), arrangement.period()),
         );
         let residual = residual?;
         Ok(Self {
-            bodies: bodies.into(),
-            particles: particles.into(),
+            arrangement,
             colours: colours.into(),
-            period,
             binder,
             cells: Arc::new(cells),
             residual: residual.map(Arc::new),
@@ -251,16 +223,22 @@ impl Solid {
         }
     }
 
-    /// The bodies that particles are made of.
+    /// The particles and their box.
+    #[must_use]
+    pub fn arrangement(&self) -> &Arrangement {
+        &self.arrangement
+    }
+
+    /// The bodies that particles are copies of.
     #[must_use]
     pub fn bodies(&self) -> &[UnitBody] {
-        &self.bodies
+        self.arrangement.bodies()
     }
 
     /// The particles, in the order of their ids.
     #[must_use]
     pub fn particles(&self) -> &[Particle] {
-        &self.particles
+        self.arrangement.particles()
     }
 
     /// Mean colour of each particle.
@@ -278,25 +256,25 @@ impl Solid {
     /// The box with whose sides the solid repeats.
     #[must_use]
     pub fn period(&self) -> &PeriodicBox {
-        &self.period
+        self.arrangement.period()
     }
 
     /// Index of the particle at a point, `None` in the binder. Some 100 ns, hardly more for more particles.
     #[must_use]
     pub fn id_at(&self, p: &Point3<f64>) -> Option<usize> {
-        self.id_within(&self.period.wrap(p))
+        self.id_within(&self.period().wrap(p))
     }
 
     /// Category of the particle at a point, `None` in the binder.
     #[must_use]
     pub fn category_at(&self, p: &Point3<f64>) -> Option<u8> {
-        self.id_at(p).map(|id| self.particles[id].category)
+        self.id_at(p).map(|id| self.particles()[id].category)
     }
 
     /// Colour at a point: mean colour plus residual. Not clamped: values may leave 0..1 by what the residual adds.
     #[must_use]
     pub fn colour_at(&self, p: &Point3<f64>) -> [f32; 3] {
-        let p = self.period.wrap(p);
+        let p = self.period().wrap(p);
         let id = self.id_within(&p);
         let mean = self.mean_colour(id);
         match &self.residual {
@@ -311,15 +289,15 @@ impl Solid {
     ///
     /// ```
     /// # use nalgebra::{Point3, Vector3};
-    /// # use stereology_shape::PeriodicBox;
+    /// # use stereology_shape::{Arrangement, PeriodicBox};
     /// # use stereology_volume::Solid;
-    /// let solid = Solid::new(vec![], vec![], vec![], PeriodicBox::new(Vector3::repeat(1.0))?, [0.5; 3], None)?;
+    /// let solid = Solid::new(Arrangement::new(vec![], vec![], PeriodicBox::new(Vector3::repeat(1.0))?)?, vec![], [0.5; 3], None)?;
     /// assert_eq!(solid.colours_at(&[Point3::origin(); 2]), [[0.5; 3]; 2]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
     pub fn colours_at(&self, points: &[Point3<f64>]) -> Vec<[f32; 3]> {
-        let place = |p: &Point3<f64>| self.period.curve_place(p);
+        let place = |p: &Point3<f64>| self.period().curve_place(p);
         let mut order: Vec<(u32, usize)> = points.par_iter().map(place).zip(0..points.len()).collect();
         order.par_sort_unstable();
         // Fetched by themselves, many at a time.
@@ -341,16 +319,16 @@ impl Solid {
     /// Inside, it is the distance to the particle's own surface: without overlap no other is nearer.
     #[must_use]
     pub fn distance_at(&self, p: &Point3<f64>) -> f64 {
-        self.cells.distance(&self.bodies, &self.period.wrap(p))
+        self.cells.distance(self.bodies(), &self.period().wrap(p))
     }
 
     pub(crate) fn id_within(&self, p: &Point3<f64>) -> Option<usize> {
-        self.cells.particle_at(&self.bodies, p)
+        self.cells.particle_at(self.bodies(), p)
     }
 
     /// The particles that some rows meet.
     pub(crate) fn strip(&self, z: f64, ys: [f64; 2]) -> Strip<'_> {
-        self.cells.strip(&self.bodies, z, ys)
+        self.cells.strip(self.bodies(), z, ys)
     }
 
     /// The residuals of binder and particles.
@@ -382,37 +360,12 @@ impl Solid {
     }
 }
 
-fn check_particles(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Result<(), SolidError> {
-    if i32::try_from(particles.len()).is_err() {
-        return Err(SolidError::TooMany {
-            particles: particles.len(),
-        });
-    }
-    let side = period.sides().min();
+/// What a solid requires of an arrangement that others do not.
+fn check_particles(arrangement: &Arrangement) -> Result<(), SolidError> {
+    let side = arrangement.sides().min();
     let mut balls = 0.0;
-    for (index, particle) in particles.iter().enumerate() {
-        let Particle {
-            shape,
-            size,
-            category,
-            position,
-            orientation,
-        } = *particle;
-        let Some(body) = bodies.get(shape) else {
-            return Err(SolidError::Shape {
-                particle: index,
-                shape,
-                bodies: bodies.len(),
-            });
-        };
-        let finite = position.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());
-        if !(finite && size.is_finite() && size > 0.0) {
-            return Err(SolidError::Particle {
-                particle: index,
-                size,
-                position: position.coords.into(),
-            });
-        }
+    for (index, particle) in arrangement.particles().iter().enumerate() {
+        let (body, size) = (&arrangement.bodies()[particle.shape], particle.size);
         if 2.0 * body.bounding_radius() * size > LARGEST_PARTICLE * side {
             return Err(SolidError::TooLarge {
                 particle: index,
@@ -420,12 +373,12 @@ fn check_particles(bodies: &[UnitBody], particles: &[Particle], period: &Periodi
                 side,
             });
         }
-        if category == u8::MAX {
+        if particle.category == u8::MAX {
             return Err(SolidError::Category { particle: index });
         }
         balls += 4.0 / 3.0 * PI * (body.bounding_radius() * size).powi(3);
     }
-    let times = balls / period.volume();
+    let times = balls / arrangement.period().volume();
     if times > MOST_CROWDED {
         Err(SolidError::Crowded { times })
     } else {
@@ -433,11 +386,11 @@ fn check_particles(bodies: &[UnitBody], particles: &[Particle], period: &Periodi
     }
 }
 
-fn check_colours(colours: &[[f32; 3]], particles: &[Particle], binder: [f32; 3]) -> Result<(), SolidError> {
-    if colours.len() != particles.len() {
+fn check_colours(colours: &[[f32; 3]], particles: usize, binder: [f32; 3]) -> Result<(), SolidError> {
+    if colours.len() != particles {
         return Err(SolidError::Colours {
             colours: colours.len(),
-            particles: particles.len(),
+            particles,
         });
     }
     let finite = |colour: &[f32; 3]| colour.iter().all(|value| value.is_finite());

@@ -27,12 +27,12 @@ impl Solid {
     ///
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// # use stereology_volume::Solid;
     /// # let bubble = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 4.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// let foam = Solid::new(vec![bubble], vec![particle], vec![[0.2; 3]], period, [0.8; 3], None)?.with_voids(&[0])?;
+    /// let foam = Solid::new(Arrangement::new(vec![bubble], vec![particle], period)?, vec![[0.2; 3]], [0.8; 3], None)?.with_voids(&[0])?;
     /// assert!(foam.is_void_at(&Point3::new(9.0, 0.0, 0.0)));
     /// assert_eq!(foam.void_distance_at(&Point3::new(0.0, 5.0, 0.0)), 3.0);
     /// # Ok::<(), Box<dyn std::error::Error>>(())

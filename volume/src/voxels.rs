@@ -103,10 +103,10 @@ impl Solid {
     ///
     /// ```
     /// # use nalgebra::Vector3;
-    /// # use stereology_shape::PeriodicBox;
+    /// # use stereology_shape::{Arrangement, PeriodicBox};
     /// # use stereology_volume::Solid;
     /// let period = PeriodicBox::new(Vector3::new(10.0, 20.0, 4.9))?;
-    /// let solid = Solid::new(vec![], vec![], vec![], period, [0.5; 3], None)?;
+    /// let solid = Solid::new(Arrangement::new(vec![], vec![], period)?, vec![], [0.5; 3], None)?;
     /// assert_eq!(solid.voxel_grid(100).counts, [50, 100, 25]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -236,13 +236,13 @@ impl Solid {
     /// ```
     /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
     /// # use std::ops::ControlFlow;
-    /// # use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
     /// use stereology_grid::{Format, read_npy};
     /// use stereology_volume::{Channel, Solid};
     /// # let sphere = UnitBody::new(&Body::sphere(1.0)?);
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// # let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0, 0.0, 0.0]], period, [0.0; 3], None)?;
+    /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
     /// # let folder = tempfile::tempdir()?;
     /// let file = folder.path().join("ids.npy");
     /// solid.write_voxels(&file, Format::Npy, &solid.voxel_grid(64), Channel::Id, &|_| ControlFlow::Continue(()))?;

@@ -16,7 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::json;
 use stereology::anneal::{Grain, PackOptions, pack, populate, scale_to_fraction, total_volume};
 use stereology::pipeline::ParticleTypes;
-use stereology::shape::{PeriodicBox, UnitBody};
+use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 use stereology::spectrum::{RealFft, frequency};
 use stereology::volume::{Axis, SlicePlane, Solid};
 
@@ -75,9 +75,11 @@ pub fn run(folder: &Path) -> Result<()> {
     let period = PeriodicBox::new(Vector3::from(SIDES))?;
     let grains = grains(&bodies, &types, &period)?;
     let start = populate(&grains, &period, SEED);
-    let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })?;
+    let packing = pack(
+        &Arrangement::new(bodies, start, period)?,
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )?;
     let mut rng = stream(1);
     let colours = packing.particles().iter().map(|particle| {
         let light = 0.035 * normal(&mut rng) as f32;
@@ -86,7 +88,7 @@ pub fn run(folder: &Path) -> Result<()> {
             .map(|c| (c + light + 0.02 * normal(&mut rng) as f32).clamp(0.02, 0.98))
     });
     let colours: Vec<[f32; 3]> = colours.collect();
-    let solid = Solid::new(bodies, packing.particles().to_vec(), colours, period, BINDER, None)?;
+    let solid = Solid::new(packing.arrangement().clone(), colours, BINDER, None)?;
     let plane = SlicePlane::across(Axis::Z, 0.5 * SIDES[2]);
     let (width, height) = (SIDES[0] as u32, SIDES[1] as u32);
     let ids = solid.slice_ids(&plane, width, height, 1.0)?;

@@ -8,7 +8,9 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_anneal::overlaps;
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation};
+use stereology_shape::{
+    Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation,
+};
 
 use crate::brute_force::periods;
 use crate::hollow::bracket;
@@ -53,8 +55,7 @@ fn pairs(
 
 /// What the library finds, but for what may be rounding.
 fn found(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Vec<(usize, usize)> {
-    let mut found: Vec<(usize, usize)> = overlaps(bodies, particles, period)
-        .unwrap()
+    let mut found: Vec<(usize, usize)> = overlaps(&Arrangement::new(bodies, particles, *period).unwrap())
         .iter()
         .filter(|overlap| overlap.depth > 2.0 * ROUNDING)
         .map(|overlap| (overlap.first, overlap.second))
@@ -276,7 +277,7 @@ fn of_twenty_thousand_aligned_cubes_none_is_wrong() {
         });
         // Boxes part along the axis in which their centres are furthest apart.
         let gap = offset.abs().max() - 0.5 * (edges[0] + edges[1]);
-        let found = overlaps(&cube, &pair, &period).unwrap();
+        let found = overlaps(&Arrangement::new(&cube[..], &pair[..], period).unwrap());
         let depth = found.first().map_or(0.0, |overlap| overlap.depth);
         assert!(
             (depth - (-gap).max(0.0)).abs() < ROUNDING,

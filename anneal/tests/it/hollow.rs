@@ -8,7 +8,9 @@ use std::ops::ControlFlow;
 use stereology_anneal::{
     ConvexParts, PackOptions, Packing, Proxy, box_for_fraction, lognormal_sizes, mix, overlaps, pack, populate,
 };
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation};
+use stereology_shape::{
+    Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation,
+};
 
 /// An L of three unit cubes in one plane: a prism over its outline.
 pub(crate) fn bracket() -> UnitBody {
@@ -111,7 +113,12 @@ fn hollow_bodies_are_packed_by_parts_and_by_proxies() {
     for proxy in [Proxy::Parts, Proxy::Hull, Proxy::Outline] {
         let options = PackOptions::default().with_proxy(proxy);
         let start = populate(&grains, &period, 1);
-        let packing = pack(&bodies, start, &period, &options, &|_| ControlFlow::Continue(())).unwrap();
+        let packing = pack(
+            &Arrangement::new(&bodies[..], start, period).unwrap(),
+            &options,
+            &|_| ControlFlow::Continue(()),
+        )
+        .unwrap();
         assert!((packing.fraction() - 0.2).abs() < 1e-9, "{proxy:?}");
     }
 }
@@ -127,9 +134,9 @@ fn chained_rings_are_apart() {
         second.orientation = UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
         vec![at(0, size, Vector3::repeat(5.0)), second]
     };
-    assert!(Packing::verify(std::slice::from_ref(&ring), pair(1.0), &period).is_ok());
-    assert!(Packing::verify(std::slice::from_ref(&ring), pair(0.2), &period).is_err());
-    assert!(Packing::verify(&[ring], pair(2.7), &period).is_ok());
+    assert!(Packing::verify(&Arrangement::new([ring.clone()], pair(1.0), period).unwrap()).is_ok());
+    assert!(Packing::verify(&Arrangement::new([ring.clone()], pair(0.2), period).unwrap()).is_err());
+    assert!(Packing::verify(&Arrangement::new([ring], pair(2.7), period).unwrap()).is_ok());
 }
 
 #[test]
@@ -146,7 +153,7 @@ fn a_ball_in_a_ring_is_apart_and_one_inside_its_tube_is_not() {
     for shape in 1..4 {
         let pair = |size_of_other: f64, aside: f64| {
             let other = at(shape, size_of_other, middle + Vector3::x() * aside);
-            overlaps(&bodies, &[at(0, size, middle), other], &period).unwrap()
+            overlaps(&Arrangement::new(&bodies[..], [at(0, size, middle), other], period).unwrap())
         };
         assert!(pair(0.9, 0.0).is_empty(), "{shape} in the hole");
         assert_eq!(pair(0.05, 1.0).len(), 1, "{shape} wholly inside the tube");
@@ -172,20 +179,20 @@ fn brackets_fill_space() {
     };
     let period = PeriodicBox::new(Vector3::new(2.0, 3.0, 1.0)).unwrap();
     let fitting = vec![upright, inverted(Vector3::new(2.0, 3.0, 0.0))];
-    let packing = Packing::verify(std::slice::from_ref(&bracket), fitting, &period).unwrap();
+    let packing = Packing::verify(&Arrangement::new([bracket.clone()], fitting, period).unwrap()).unwrap();
     assert!((packing.fraction() - 1.0).abs() < 1e-9);
     // All of the same planes, but on one another.
     for corner in [[2.0, 2.0, 0.0], [1.0, 2.0, 0.0], [1.5, 3.0, 0.0]] {
         let period = PeriodicBox::new(Vector3::new(6.0, 6.0, 6.0)).unwrap();
         let pair = vec![upright, inverted(Vector3::from(corner))];
         assert!(
-            Packing::verify(std::slice::from_ref(&bracket), pair, &period).is_err(),
+            Packing::verify(&Arrangement::new([bracket.clone()], pair, period).unwrap()).is_err(),
             "{corner:?}"
         );
     }
     let same = vec![upright, upright];
     let period = PeriodicBox::new(Vector3::new(6.0, 6.0, 6.0)).unwrap();
-    assert!(Packing::verify(&[bracket], same, &period).is_err());
+    assert!(Packing::verify(&Arrangement::new([bracket], same, period).unwrap()).is_err());
 }
 
 proptest! {
@@ -202,7 +209,7 @@ proptest! {
             orientation: isotropic_rotation(&mut rng),
             ..at(shapes[k], 1.0 + rng.random::<f64>(), Vector3::repeat(10.0) + Vector3::from_fn(|_, _| 0.9 * k as f64 * (2.0 * rng.random::<f64>() - 1.0)))
         });
-        let found = overlaps(&bodies, &pair, &period).unwrap();
+        let found = overlaps(&Arrangement::new(&bodies[..], &pair[..], period).unwrap());
         let [a, b] = &pair;
         let reach = bodies[b.shape].bounding_radius();
         let shared = (0..20_000).filter(|_| {
@@ -226,9 +233,11 @@ fn linked_rings_too_thick_for_each_other_are_freed() {
     let grains = mix(&lognormal_sizes(120, 0.4, 2).unwrap(), &[1.0], 2).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.2).unwrap();
     let start = populate(&grains, &period, 2);
-    let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })
+    let packing = pack(
+        &Arrangement::new(&bodies[..], start, period).unwrap(),
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )
     .unwrap();
     assert!((packing.fraction() - 0.2).abs() < 1e-9);
 }

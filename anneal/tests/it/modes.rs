@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use stereology_anneal::{
     Mode, PackError, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, pack, populate,
 };
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 
 const MODES: [Mode; 4] = [Mode::fast(), Mode::paper(), Mode::anneal(), Mode::sequential()];
 
@@ -24,9 +24,11 @@ fn short(mode: Mode) -> Mode {
 fn packed(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOptions) -> Result<Packing, PackError> {
     let grains = mix(&lognormal_sizes(count, 0.3, 5).unwrap(), &vec![1.0; bodies.len()], 5).unwrap();
     let period = box_for_fraction(bodies, &grains, fraction).unwrap();
-    pack(bodies, populate(&grains, &period, 5), &period, options, &|_| {
-        ControlFlow::Continue(())
-    })
+    pack(
+        &Arrangement::new(bodies, populate(&grains, &period, 5), period).unwrap(),
+        options,
+        &|_| ControlFlow::Continue(()),
+    )
 }
 
 fn mixture() -> Vec<UnitBody> {
@@ -65,9 +67,11 @@ fn every_mode_can_be_cancelled() {
     let period = box_for_fraction(&spheres, &grains, 0.3).unwrap();
     for mode in MODES {
         let options = PackOptions::default().with_mode(mode);
-        let result = pack(&spheres, populate(&grains, &period, 0), &period, &options, &|_| {
-            ControlFlow::Break(())
-        });
+        let result = pack(
+            &Arrangement::new(&spheres[..], populate(&grains, &period, 0), period).unwrap(),
+            &options,
+            &|_| ControlFlow::Break(()),
+        );
         assert!(matches!(result, Err(PackError::Cancelled)), "{mode:?}");
     }
 }
@@ -77,7 +81,7 @@ fn threads_change_no_bit_in_any_mode() {
     let run = |threads: usize, mode: Mode| -> Vec<Particle> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = PackOptions::default().with_mode(mode);
-        pool.install(|| packed(&mixture(), 100, 0.2, &options).unwrap().into_particles())
+        pool.install(|| packed(&mixture(), 100, 0.2, &options).unwrap().particles().to_vec())
     };
     for mode in MODES {
         assert_eq!(run(1, mode), run(2, mode), "{mode:?}");
@@ -95,7 +99,12 @@ fn threads_change_no_bit_of_any_shape() {
     let run = |threads: usize, mode: Mode, (bodies, count, fraction): &(Vec<UnitBody>, usize, f64)| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = PackOptions::default().with_mode(mode);
-        pool.install(|| packed(bodies, *count, *fraction, &options).unwrap().into_particles())
+        pool.install(|| {
+            packed(bodies, *count, *fraction, &options)
+                .unwrap()
+                .particles()
+                .to_vec()
+        })
     };
     for kind in &kinds {
         for mode in [Mode::fast(), Mode::paper()] {
@@ -115,7 +124,7 @@ proptest! {
         let grains = mix(&vec![1.0; count], &[0.7, 0.3], seed).unwrap();
         let options = PackOptions::default().with_mode(short(MODES[mode]));
         let start = populate(&grains, &period, seed);
-        match pack(&rods, start, &period, &options, &|_| ControlFlow::Continue(())) {
+        match pack(&Arrangement::new(&rods[..], start, period).unwrap(), &options, &|_| ControlFlow::Continue(())) {
             Ok(packing) => {
                 let spheres: Vec<Particle> = packing.particles().iter().filter(|p| p.shape == 1).copied().collect();
                 if !spheres.is_empty() {

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_anneal::{Packing, overlaps};
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 
 fn sphere() -> UnitBody {
     UnitBody::new(&Body::sphere(1.0).unwrap())
@@ -56,7 +56,7 @@ proptest! {
         let first = Point3::from(place);
         let second = first + way;
         let particles = [at(sizes.0, place), at(sizes.1, [second.x, second.y, second.z])];
-        let found = overlaps(&[sphere()], &particles, &PeriodicBox::new(Vector3::repeat(10.0)).unwrap()).unwrap();
+        let found = overlaps(&Arrangement::new([sphere()], &particles[..], PeriodicBox::new(Vector3::repeat(10.0)).unwrap()).unwrap());
         if gap < -1e-9 {
             prop_assert_eq!(found.len(), 1);
             prop_assert!((found[0].depth - (touching - distance)).abs() < 1e-9);
@@ -71,7 +71,7 @@ proptest! {
         count in 1_usize..60, largest in 0.2..2.5_f64, sides in prop::array::uniform3(1.0..6.0_f64), seed in 0_u64..1000,
     ) {
         let (particles, period) = scattered(count, largest, sides, seed);
-        let found = overlaps(&[sphere()], &particles, &period).unwrap();
+        let found = overlaps(&Arrangement::new([sphere()], &particles[..], period).unwrap());
         let expected = sphere_overlaps(&particles, &period);
         prop_assert_eq!(found.len(), expected.len());
         for (pair, (_, _, depth)) in found.iter().zip(expected) {
@@ -85,7 +85,7 @@ proptest! {
         let (mut particles, period) = scattered(40, 1.5, [3.0, 4.0, 5.0], seed);
         let bodies = [UnitBody::new(&Body::rock(3))];
         let pairs = |particles: &[Particle]| {
-            let mut pairs: Vec<_> = overlaps(&bodies, particles, &period).unwrap().iter().map(|o| (o.first, o.second)).collect();
+            let mut pairs: Vec<_> = overlaps(&Arrangement::new(&bodies[..], particles, period).unwrap()).iter().map(|o| (o.first, o.second)).collect();
             pairs.sort_unstable();
             pairs
         };
@@ -136,11 +136,13 @@ fn agrees(body: &UnitBody, edges: [f64; 3], particles: &[Particle; 2]) -> Result
     let offset = particles[1].position - particles[0].position;
     let expected = boxes_overlap(particles.map(|p| unit * p.size), turns, &offset);
     let found = overlaps(
-        std::slice::from_ref(body),
-        particles,
-        &PeriodicBox::new(Vector3::repeat(100.0)).unwrap(),
-    )
-    .unwrap();
+        &Arrangement::new(
+            std::slice::from_ref(body),
+            particles.as_slice(),
+            PeriodicBox::new(Vector3::repeat(100.0)).unwrap(),
+        )
+        .unwrap(),
+    );
     // Between touching and 1e-9 either answer is right.
     let really = found.iter().any(|o| o.depth > 2e-9);
     prop_assert_eq!(really, expected, "{:?} {:?}", found, particles);
@@ -152,23 +154,25 @@ fn agrees(body: &UnitBody, edges: [f64; 3], particles: &[Particle; 2]) -> Result
 fn touching_passes_and_overlapping_fails() {
     let period = PeriodicBox::new(Vector3::new(10.0, 5.0, 5.0)).unwrap();
     let pair = |distance: f64| vec![at(1.0, [0.0; 3]), at(2.0, [distance, 0.0, 0.0])];
-    assert!(Packing::verify(&[sphere()], pair(1.5), &period).is_ok());
-    assert!(Packing::verify(&[sphere()], pair(1.5 - 1e-9), &period).is_err());
+    assert!(Packing::verify(&Arrangement::new([sphere()], pair(1.5), period).unwrap()).is_ok());
+    assert!(Packing::verify(&Arrangement::new([sphere()], pair(1.5 - 1e-9), period).unwrap()).is_err());
     let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
     let size = cube.body().size();
     let pair = |distance: f64| vec![at(size, [0.0; 3]), at(size, [distance, 0.3, 0.2])];
-    assert!(Packing::verify(std::slice::from_ref(&cube), pair(1.0), &period).is_ok());
-    assert!(Packing::verify(&[cube], pair(1.0 - 1e-9), &period).is_err());
+    assert!(Packing::verify(&Arrangement::new([cube.clone()], pair(1.0), period).unwrap()).is_ok());
+    assert!(Packing::verify(&Arrangement::new([cube], pair(1.0 - 1e-9), period).unwrap()).is_err());
 }
 
 #[test]
 fn cubes_fill_space() {
     let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
     let size = cube.body().size();
-    let lattice = (0..27)
+    let lattice: Vec<Particle> = (0..27)
         .map(|k| at(size, [k % 3, k / 3 % 3, k / 9].map(|x| f64::from(x) + 0.1)))
         .collect();
-    let packing = Packing::verify(&[cube], lattice, &PeriodicBox::new(Vector3::repeat(3.0)).unwrap()).unwrap();
+    let packing =
+        Packing::verify(&Arrangement::new([cube], lattice, PeriodicBox::new(Vector3::repeat(3.0)).unwrap()).unwrap())
+            .unwrap();
     assert!((packing.fraction() - 1.0).abs() < 1e-12);
 }
 
@@ -179,7 +183,7 @@ fn a_rod_longer_than_the_box_meets_only_itself() {
     let size = rod.body().size();
     let period = PeriodicBox::new(Vector3::repeat(2.0)).unwrap();
     let along = at(size, [1.0; 3]);
-    let found = overlaps(std::slice::from_ref(&rod), &[along], &period).unwrap();
+    let found = overlaps(&Arrangement::new([rod.clone()], [along], period).unwrap());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].first, found[0].second), (0, 0));
     // One unit along itself, but its own width aside.
@@ -188,15 +192,15 @@ fn a_rod_longer_than_the_box_meets_only_itself() {
         orientation: UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5),
         ..along
     };
-    assert!(Packing::verify(&[rod], vec![turned], &period).is_ok());
+    assert!(Packing::verify(&Arrangement::new([rod], vec![turned], period).unwrap()).is_ok());
 }
 
 #[test]
 fn spheres_and_ellipsoids_of_equal_axes_agree() {
     let ball = UnitBody::new(&Body::ellipsoid([0.5, 0.5, 0.5 + 1e-9]).unwrap());
     let (particles, period) = scattered(300, 1.0, [4.0, 4.0, 4.0], 5);
-    let expected = overlaps(&[sphere()], &particles, &period).unwrap();
-    let found = overlaps(&[ball], &particles, &period).unwrap();
+    let expected = overlaps(&Arrangement::new([sphere()], &particles[..], period).unwrap());
+    let found = overlaps(&Arrangement::new([ball], &particles[..], period).unwrap());
     assert_eq!(found.len(), expected.len());
     for (p, q) in found.iter().zip(&expected) {
         assert!((p.depth - q.depth).abs() < 1e-6, "{p:?} {q:?}");

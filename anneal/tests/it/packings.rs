@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use stereology_anneal::{
     Mode, PackError, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, overlaps, pack, populate,
 };
-use stereology_shape::{Body, Particle, UnitBody};
+use stereology_shape::{Arrangement, Body, Particle, UnitBody};
 
 fn packed(
     bodies: &[UnitBody],
@@ -23,9 +23,11 @@ fn packed(
     )
     .unwrap();
     let period = box_for_fraction(bodies, &grains, fraction).unwrap();
-    pack(bodies, populate(&grains, &period, seed), &period, options, &|_| {
-        ControlFlow::Continue(())
-    })
+    pack(
+        &Arrangement::new(bodies, populate(&grains, &period, seed), period)?,
+        options,
+        &|_| ControlFlow::Continue(()),
+    )
 }
 
 fn zoo() -> Vec<UnitBody> {
@@ -50,7 +52,7 @@ proptest! {
         let packing = match packed(&zoo(), count, sigma, fraction, seed, &PackOptions::default()) {
             Ok(packing) => packing,
             // A few particles in a small box may not fit beside their own images.
-            Err(PackError::Particle(_) | PackError::TooWide { .. } | PackError::Unresolved(_)) if count < 8 => return Ok(()),
+            Err(PackError::Arrangement(_) | PackError::TooWide { .. } | PackError::Unresolved(_)) if count < 8 => return Ok(()),
             Err(error) => return Err(TestCaseError::fail(error.to_string())),
         };
         prop_assert!((packing.fraction() - fraction).abs() < 1e-9);
@@ -58,7 +60,7 @@ proptest! {
         for particle in packing.particles() {
             prop_assert_eq!(particle.position, packing.period().wrap(&particle.position));
         }
-        prop_assert!(overlaps(packing.bodies(), packing.particles(), packing.period()).unwrap().is_empty());
+        prop_assert!(overlaps(&packing).is_empty());
     }
 }
 
@@ -86,9 +88,11 @@ fn dust_gets_out_from_under_boulders() {
     let grains = mix(&sizes, &[1.0], 0).unwrap();
     let period = box_for_fraction(&spheres, &grains, 0.4).unwrap();
     let start = populate(&grains, &period, 0);
-    let packing = pack(&spheres, start, &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })
+    let packing = pack(
+        &Arrangement::new(&spheres[..], start, period).unwrap(),
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )
     .unwrap();
     assert!(packing.iterations() < 500, "{}", packing.iterations());
 }
@@ -114,9 +118,7 @@ fn the_way_of_the_paper_packs_too_and_turns_nobody() {
     let start = populate(&grains, &period, 3);
     let options = PackOptions::default().with_mode(Mode::paper());
     let packing = pack(
-        &bodies,
-        start.clone(),
-        &period,
+        &Arrangement::new(&bodies[..], start.clone(), period).unwrap(),
         &options,
         &|_| ControlFlow::Continue(()),
     )
@@ -137,7 +139,7 @@ fn threads_change_no_bit() {
         pool.install(|| {
             let spheres = packed(&zoo()[..1], 3000, 0.3, 0.55, 9, &PackOptions::default()).unwrap();
             let mixture = packed(&zoo(), 700, 0.3, 0.35, 9, &PackOptions::default()).unwrap();
-            [spheres.into_particles(), mixture.into_particles()].concat()
+            [spheres.particles().to_vec(), mixture.particles().to_vec()].concat()
         })
     };
     let bits = |particles: Vec<Particle>| -> Vec<u64> {
@@ -159,9 +161,7 @@ fn threads_change_no_bit() {
 fn a_packing_stays_as_it_is() {
     let packing = packed(&zoo(), 50, 0.2, 0.3, 4, &PackOptions::default()).unwrap();
     let again = pack(
-        packing.bodies(),
-        packing.particles().to_vec(),
-        packing.period(),
+        &packing,
         &PackOptions::default().with_mode(Mode::Fast {
             iterations: 1,
             swelling: Some(1.001),
@@ -183,9 +183,11 @@ fn identical_particles_in_one_place_part() {
         orientation: UnitQuaternion::identity(),
     };
     for shape in 0..bodies.len() {
-        pack(&bodies, vec![same(shape); 8], &period, &PackOptions::default(), &|_| {
-            ControlFlow::Continue(())
-        })
+        pack(
+            &Arrangement::new(&bodies[..], vec![same(shape); 8], period).unwrap(),
+            &PackOptions::default(),
+            &|_| ControlFlow::Continue(()),
+        )
         .unwrap();
     }
 }

@@ -7,15 +7,13 @@ use stereology_anneal::{
     Distance, PackOptions, Packing, bond_order, box_for_fraction, carnahan_starling, equilibrate, lognormal_sizes, mix,
     orientation_tensor, pack, populate, radial_distribution, section_test,
 };
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 
 fn packed(bodies: &[UnitBody], count: usize, sigma: f64, fraction: f64, seed: u64) -> Packing {
     let grains = mix(&lognormal_sizes(count, sigma, seed).unwrap(), &[1.0], seed).unwrap();
     let period = box_for_fraction(bodies, &grains, fraction).unwrap();
     pack(
-        bodies,
-        populate(&grains, &period, seed),
-        &period,
+        &Arrangement::new(bodies, populate(&grains, &period, seed), period).unwrap(),
         &PackOptions::default(),
         &|_| ControlFlow::Continue(()),
     )
@@ -161,9 +159,7 @@ fn the_section_test_is_calibrated_and_sees_layers() {
     let low = (0..200)
         .filter(|seed| {
             let packing = pack(
-                &bodies,
-                populate(&grains, &period, *seed),
-                &period,
+                &Arrangement::new(&bodies[..], populate(&grains, &period, *seed), period).unwrap(),
                 &PackOptions::default(),
                 &|_| ControlFlow::Continue(()),
             );
@@ -179,9 +175,12 @@ fn the_section_test_is_calibrated_and_sees_layers() {
         orientation: UnitQuaternion::identity(),
     });
     let crystal = Packing::verify(
-        &bodies,
-        lattice.collect(),
-        &PeriodicBox::new(Vector3::repeat(6.0)).unwrap(),
+        &Arrangement::new(
+            &bodies[..],
+            lattice.collect::<Vec<_>>(),
+            PeriodicBox::new(Vector3::repeat(6.0)).unwrap(),
+        )
+        .unwrap(),
     )
     .unwrap();
     assert!((section_test(&crystal, 6, 99, 0).p_value - 0.01).abs() < 1e-9);
@@ -196,7 +195,7 @@ proptest! {
         let bodies = sphere();
         let grains = mix(&[diameter; 300], &[1.0], seed).unwrap();
         let period = box_for_fraction(&bodies, &grains, fraction).unwrap();
-        let packing = pack(&bodies, populate(&grains, &period, seed), &period, &PackOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
+        let packing = pack(&Arrangement::new(&bodies[..], populate(&grains, &period, seed), period).unwrap(), &PackOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
         let test = section_test(&packing, 10, 2, seed);
         let expected = diameter * 300.0 / period.volume();
         let profiles: f64 = test.profiles.iter().sum();

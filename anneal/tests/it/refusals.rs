@@ -3,11 +3,8 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use stereology_anneal::{
-    Mode, PackError, PackOptions, Packing, ParticleError, VerifyError, box_for_fraction, density_limit, mix, pack,
-    populate,
-};
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
+use stereology_anneal::{Mode, PackError, PackOptions, Packing, box_for_fraction, density_limit, mix, pack, populate};
+use stereology_shape::{Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
 
 fn sphere() -> UnitBody {
     UnitBody::new(&Body::sphere(1.0).unwrap())
@@ -26,9 +23,11 @@ fn particle() -> Particle {
 fn try_pack(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOptions) -> Result<Packing, PackError> {
     let grains = mix(&vec![1.0; count], &[1.0], 0).unwrap();
     let period = box_for_fraction(bodies, &grains, fraction).unwrap();
-    pack(bodies, populate(&grains, &period, 0), &period, options, &|_| {
-        ControlFlow::Continue(())
-    })
+    pack(
+        &Arrangement::new(bodies, populate(&grains, &period, 0), period).unwrap(),
+        options,
+        &|_| ControlFlow::Continue(()),
+    )
 }
 
 #[test]
@@ -81,45 +80,19 @@ fn jamming_is_reported_with_what_remains() {
 #[test]
 fn a_particle_wider_than_the_box_is_refused() {
     let period = PeriodicBox::new(Vector3::new(0.9, 2.0, 2.0)).unwrap();
-    let result = pack(&[sphere()], vec![particle()], &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    });
+    let result = pack(
+        &Arrangement::new([sphere()], vec![particle()], period).unwrap(),
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    );
     assert!(matches!(result, Err(PackError::TooWide { index: 0, .. })));
 }
 
 #[test]
-fn values_that_are_none_are_refused() {
+fn options_out_of_range_are_refused() {
     let period = PeriodicBox::new(Vector3::repeat(3.0)).unwrap();
-    let refused = |particle: Particle| match Packing::verify(&[sphere()], vec![particle], &period) {
-        Err(VerifyError::Particle(error)) => error,
-        other => panic!("{other:?}"),
-    };
-    assert!(matches!(
-        refused(Particle { shape: 1, ..particle() }),
-        ParticleError::NoSuchShape { shape: 1, .. }
-    ));
-    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            refused(Particle { size, ..particle() }),
-            ParticleError::Size { .. }
-        ));
-    }
-    assert!(matches!(
-        refused(Particle {
-            size: 20.0,
-            ..particle()
-        }),
-        ParticleError::TooLong { .. }
-    ));
-    let position = Point3::new(f64::NAN, 0.0, 0.0);
-    assert!(matches!(
-        refused(Particle { position, ..particle() }),
-        ParticleError::Place { .. }
-    ));
     let result = pack(
-        &[sphere()],
-        vec![],
-        &period,
+        &Arrangement::new([sphere()], vec![], period).unwrap(),
         &PackOptions::default().with_mode(Mode::Paper {
             iterations: 1,
             swelling: Some(2.0),
@@ -128,7 +101,9 @@ fn values_that_are_none_are_refused() {
     );
     assert!(matches!(result, Err(PackError::Swelling(_))));
     let tight = PackOptions::default().with_tolerance(0.0);
-    let result = pack(&[sphere()], vec![], &period, &tight, &|_| ControlFlow::Continue(()));
+    let result = pack(&Arrangement::new([sphere()], vec![], period).unwrap(), &tight, &|_| {
+        ControlFlow::Continue(())
+    });
     assert!(matches!(result, Err(PackError::Tolerance(_))));
 }
 
@@ -142,7 +117,7 @@ fn a_jam_says_how_far_it_came() {
     assert!((0.3..0.384).contains(&jam.reached), "{}", jam.reached);
     assert!(jam.placed.len() < jam.count && jam.count == 300 && jam.tries == 2000);
     assert!(jam.to_string().contains("jammed at"));
-    assert!(Packing::verify(&[sphere()], jam.placed.clone(), &jam_box(&jam)).is_ok());
+    assert!(Packing::verify(&Arrangement::new([sphere()], jam.placed.clone(), jam_box(&jam)).unwrap()).is_ok());
 }
 
 fn jam_box(jam: &stereology_anneal::Jam) -> PeriodicBox {
@@ -153,9 +128,11 @@ fn jam_box(jam: &stereology_anneal::Jam) -> PeriodicBox {
 #[test]
 fn no_particles_are_a_packing() {
     let period = PeriodicBox::new(Vector3::repeat(3.0)).unwrap();
-    let packing = pack(&[], vec![], &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })
+    let packing = pack(
+        &Arrangement::new([], vec![], period).unwrap(),
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )
     .unwrap();
     assert!(packing.fraction().abs() < 1e-300 && packing.particles().is_empty());
 }
@@ -170,9 +147,7 @@ fn progress_and_cancelling() {
         let calls = AtomicUsize::new(0);
         let last = std::sync::Mutex::new(0.0_f64);
         let result = pack(
-            &bodies,
-            populate(&grains, &period, 0),
-            &period,
+            &Arrangement::new(&bodies[..], populate(&grains, &period, 0), period).unwrap(),
             &PackOptions::default(),
             &|done| {
                 let mut last = last.lock().unwrap();

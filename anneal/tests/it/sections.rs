@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
-use stereology_shape::{Body, UnitBody};
+use stereology_shape::{Arrangement, Body, UnitBody};
 
 /// Eq. (1): N_A = D N_V, and Delesse: A_A = V_V, on planes through a packing of spheres.
 ///
@@ -15,9 +15,11 @@ fn sections_obey_the_fundamental_relation() {
     let grains = mix(&lognormal_sizes(2000, 0.3, 11).unwrap(), &[1.0], 11).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.5).unwrap();
     let start = populate(&grains, &period, 11);
-    let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
-        ControlFlow::Continue(())
-    })
+    let packing = pack(
+        &Arrangement::new(&bodies[..], start, period).unwrap(),
+        &PackOptions::default(),
+        &|_| ControlFlow::Continue(()),
+    )
     .unwrap();
     let side = packing.sides().x;
     let planes = 20;

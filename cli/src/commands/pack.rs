@@ -10,7 +10,7 @@ use stereology::anneal::{
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
 };
 use stereology::files::PackingFile;
-use stereology::shape::{PeriodicBox, UnitBody};
+use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -229,9 +229,7 @@ impl Pack {
         let step = Step::begin("packing", everywhere.quiet);
         let progress = |done: f64| step.at(done);
         let packing = pack(
-            &bodies,
-            populate(&grains, &period, everywhere.seed),
-            &period,
+            &Arrangement::new(&bodies[..], populate(&grains, &period, everywhere.seed), period).or_fail()?,
             &options,
             &progress,
         )

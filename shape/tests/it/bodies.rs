@@ -1,10 +1,12 @@
 //! Bodies against closed forms and against themselves moved, turned and scaled.
 
 use approx::assert_relative_eq;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, isotropic_rotation};
+use stereology_shape::{
+    Arrangement, ArrangementError, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation,
+};
 
 use crate::random_shapes::{fat_l, hollow_cube, polytopes, rotations};
 
@@ -125,4 +127,83 @@ fn signed_mean_width_counts_profiles_less_holes() {
         fine.signed_mean_width() > fine.mean_width(),
         "upright sections show two profiles"
     );
+}
+
+/// Each fault of a particle has its own error, with the index of the particle.
+#[test]
+fn arrangements_refuse_particles_that_are_not_valid() {
+    let ball = UnitBody::new(&Body::sphere(1.0).unwrap());
+    let period = PeriodicBox::new(Vector3::new(5.0, 3.0, 4.0)).unwrap();
+    let good = Particle {
+        shape: 0,
+        size: 1.0,
+        category: 255,
+        position: Point3::new(-40.0, 0.0, 1e9),
+        orientation: UnitQuaternion::identity(),
+    };
+    assert!(Arrangement::new([ball.clone()], [good, good], period).is_ok());
+    let refused = |particle: Particle| {
+        Arrangement::new([ball.clone()], [good, particle], period)
+            .map(|_| ())
+            .unwrap_err()
+    };
+    assert!(matches!(
+        refused(Particle { shape: 1, ..good }),
+        ArrangementError::NoSuchShape {
+            particle: 1,
+            shape: 1,
+            shapes: 1
+        }
+    ));
+    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            refused(Particle { size, ..good }),
+            ArrangementError::Size { particle: 1, .. }
+        ));
+    }
+    for x in [f64::NAN, f64::INFINITY] {
+        let position = Point3::new(0.0, x, 0.0);
+        assert!(matches!(
+            refused(Particle { position, ..good }),
+            ArrangementError::Position { particle: 1, .. }
+        ));
+    }
+    for quaternion in [
+        [1.0, 0.1, 0.0, 0.0],
+        [0.0; 4],
+        [f64::NAN, 0.0, 0.0, 0.0],
+        [f64::INFINITY, 0.0, 0.0, 0.0],
+    ] {
+        let [w, i, j, k] = quaternion;
+        let orientation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, i, j, k));
+        assert!(matches!(
+            refused(Particle { orientation, ..good }),
+            ArrangementError::Orientation { particle: 1, .. }
+        ));
+    }
+    // A sphere's length is its size; four times the shortest side is allowed.
+    assert!(matches!(
+        refused(Particle { size: 12.1, ..good }),
+        ArrangementError::TooLong { particle: 1, .. }
+    ));
+    assert!(Arrangement::new([ball.clone()], [Particle { size: 12.0, ..good }], period).is_ok());
+}
+
+proptest! {
+    /// Wrapping moves each particle by whole sides of the box and changes nothing else.
+    #[test]
+    fn wrapping_keeps_everything_but_the_image(at in prop::array::uniform3(-50.0..50.0_f64), size in 0.1..2.0_f64) {
+        let period = PeriodicBox::new(Vector3::new(5.0, 3.0, 4.0)).unwrap();
+        let particle =
+            Particle { shape: 0, size, category: 3, position: Point3::from(at), orientation: UnitQuaternion::identity() };
+        let given = Arrangement::new([UnitBody::new(&Body::rock(1))], [particle], period).unwrap();
+        let wrapped = given.wrapped();
+        let moved = wrapped.particles()[0];
+        prop_assert_eq!(Particle { position: particle.position, ..moved }, particle);
+        prop_assert_eq!(wrapped.fraction(), given.fraction());
+        for (k, x) in at.into_iter().enumerate() {
+            let turns = (moved.position[k] - x) / period.sides()[k];
+            prop_assert!((0.0..period.sides()[k]).contains(&moved.position[k]) && (turns - turns.round()).abs() < 1e-12);
+        }
+    }
 }

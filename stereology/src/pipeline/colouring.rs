@@ -24,7 +24,7 @@ use stereology_shape::Particle;
 /// use stereology::anneal::Packing;
 /// use stereology::pipeline::{ParticleTypes, particle_colours};
 /// use stereology::segment::{SegmentOptions, Segmentation};
-/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::shape::{Arrangement, Particle, PeriodicBox};
 ///
 /// // One brick profile; every particle becomes brick.
 /// let brick = |x: usize, y: usize| (20..60).contains(&x) && (30..50).contains(&y);
@@ -33,7 +33,7 @@ use stereology_shape::Particle;
 /// let found = Segmentation::from_labels(&photo, labels, &SegmentOptions::default())?;
 /// let particle = Particle { shape: 0, size: 4.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
 /// let spheres = ParticleTypes::parse(&["sphere"])?.unit_bodies();
-/// let packing = Packing::verify(&spheres, vec![particle], &PeriodicBox::new(Vector3::repeat(10.0))?)?;
+/// let packing = Packing::verify(&Arrangement::new(&spheres[..], vec![particle], PeriodicBox::new(Vector3::repeat(10.0))?)?)?;
 /// let red = particle_colours(&packing, &found.profiles, 1.0, 0)[0][0];
 /// assert!((red - 170.0 / 255.0).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

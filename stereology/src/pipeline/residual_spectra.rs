@@ -65,7 +65,7 @@ const LEAST_SHARE: f64 = 0.02;
 /// use stereology::segment::{SegmentOptions, Segmentation};
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use stereology::pipeline::ParticleTypes;
-/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::shape::{Arrangement, Particle, PeriodicBox};
 /// use stereology::volume::{Axis, Residual, SlicePlane, Solid};
 ///
 /// // A sphere of diameter 40 in a box of side 64.
@@ -74,7 +74,7 @@ const LEAST_SHARE: f64 = 0.02;
 /// let period = PeriodicBox::new(Vector3::repeat(64.0))?;
 /// let ripple = ndarray::Array4::from_shape_fn((64, 64, 64, 3), |(z, y, x, _)| 0.05 * (0.8 * (x + y + z) as f32).sin());
 /// let residual = Residual { particles: 0.0 * &ripple, binder: ripple, voxel: 1.0 };
-/// let solid = Solid::new(spheres.unit_bodies(), vec![particle], vec![[0.7, 0.3, 0.2]], period, [0.8; 3], Some(residual))?;
+/// let solid = Solid::new(Arrangement::new(spheres.unit_bodies(), vec![particle], period)?, vec![[0.7, 0.3, 0.2]], [0.8; 3], Some(residual))?;
 /// let middle = SlicePlane::across(Axis::Z, 32.0);
 /// let photo = Segmentation::from_labels(&solid.slice(&middle, 64, 64, 1.0)?, solid.slice_ids(&middle, 64, 64, 1.0)?, &SegmentOptions::default())?;
 /// let spectra = residual_spectra(&photo, &solid, 1.0)?;

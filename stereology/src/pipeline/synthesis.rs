@@ -14,6 +14,7 @@ use std::ops::ControlFlow;
 use stereology_anneal::{PackError, PackOptions, Packing, pack, populate};
 use stereology_pyramid::{TextureError, TextureOptions};
 use stereology_segment::{SegmentError, SegmentOptions, Segmentation, segment};
+use stereology_shape::{Arrangement, ArrangementError};
 use stereology_unfold::UnfoldError;
 use stereology_volume::{Solid, SolidError};
 
@@ -125,6 +126,9 @@ pub enum SynthesisError {
     /// Choosing particles.
     #[error(transparent)]
     Population(#[from] PopulationFailure),
+    /// Arranging them.
+    #[error(transparent)]
+    Arrangement(#[from] ArrangementError),
     /// Packing them.
     #[error(transparent)]
     Pack(#[from] PackError),
@@ -220,11 +224,12 @@ pub fn synthesize(
         texture_period,
         options.seed,
     )?;
-    let bodies = types.unit_bodies();
-    let start = populate(&population.grains, &population.period, options.seed);
-    let packing = pack(&bodies, start, &population.period, &options.pack, &|done| {
-        progress(Step::Pack, done)
-    })?;
+    let start = Arrangement::new(
+        types.unit_bodies(),
+        populate(&population.grains, &population.period, options.seed),
+        population.period,
+    )?;
+    let packing = pack(&start, &options.pack, &|done| progress(Step::Pack, done))?;
     let details = fine_details(
         &segmentation,
         &segmentation.residual(),
@@ -234,10 +239,8 @@ pub fn synthesize(
         &|done| progress(Step::Texture, done),
     )?;
     let solid = Solid::new(
-        bodies,
-        packing.particles().to_vec(),
+        packing.arrangement().clone(),
         particle_colours(&packing, &segmentation.profiles, options.pixel, options.seed),
-        population.period,
         segmentation.binder.colour.map(|c| c as f32),
         Some(details.residual.clone()),
     )?

@@ -92,14 +92,14 @@ pub enum Recipe<'a> {
 /// use stereology::segment::{SegmentOptions, Segmentation};
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use stereology::pipeline::ParticleTypes;
-/// use stereology::shape::{Particle, PeriodicBox};
+/// use stereology::shape::{Arrangement, Particle, PeriodicBox};
 /// use stereology::volume::{Axis, SlicePlane, Solid};
 ///
 /// // A sphere of diameter 40 in a box of side 64.
 /// let spheres = ParticleTypes::parse(&["sphere"])?;
 /// let particle = Particle { shape: 0, size: 40.0, category: 0, position: Point3::new(32.0, 32.0, 32.0), orientation: UnitQuaternion::identity() };
 /// let period = PeriodicBox::new(Vector3::repeat(64.0))?;
-/// let solid = Solid::new(spheres.unit_bodies(), vec![particle], vec![[0.7, 0.3, 0.2]], period, [0.9; 3], None)?;
+/// let solid = Solid::new(Arrangement::new(spheres.unit_bodies(), vec![particle], period)?, vec![[0.7, 0.3, 0.2]], [0.9; 3], None)?;
 /// let middle = SlicePlane::across(Axis::Z, 32.0);
 /// let options = SegmentOptions::default();
 /// let photo = Segmentation::from_labels(&solid.slice(&middle, 64, 64, 1.0)?, solid.slice_ids(&middle, 64, 64, 1.0)?, &options)?;

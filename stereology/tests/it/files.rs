@@ -5,7 +5,7 @@ use ndarray::Array4;
 use proptest::prelude::*;
 use stereology::files::{PackingFile, open_solid, save_solid};
 use stereology::pipeline::ParticleTypes;
-use stereology::shape::{Particle, PeriodicBox};
+use stereology::shape::{Arrangement, Particle, PeriodicBox};
 use stereology::volume::{Residual, Solid};
 
 fn particle() -> impl Strategy<Value = Particle> {
@@ -48,7 +48,7 @@ proptest! {
         let colours = (0..particles.len()).map(|i| [0.1 * i as f32 % 1.0, 0.3, 0.7]).collect();
         let field = Array4::from_shape_vec((4, 4, 4, 3), texture).unwrap();
         let residual = Residual { particles: -&field, binder: field, voxel: 2.0 };
-        let solid = Solid::new(types.unit_bodies(), particles, colours, period, [0.8, 0.7, 0.6], Some(residual.clone())).unwrap();
+        let solid = Solid::new(Arrangement::new(types.unit_bodies(), particles, period).unwrap(), colours, [0.8, 0.7, 0.6], Some(residual.clone())).unwrap();
         save_solid(folder.path(), &solid, &residual, &types).unwrap();
         let read = open_solid(folder.path()).unwrap().solid;
         for i in 0..200 {
@@ -92,10 +92,8 @@ fn damaged_solids_are_refused() {
         voxel: 2.0,
     };
     let solid = Solid::new(
-        types.unit_bodies(),
-        vec![particle],
+        Arrangement::new(types.unit_bodies(), vec![particle], period).unwrap(),
         vec![[0.5; 3]],
-        period,
         [0.8; 3],
         Some(residual.clone()),
     )

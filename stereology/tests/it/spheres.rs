@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use stereology::anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
+use stereology::shape::Arrangement;
 use stereology::unfold::{Method, ProfileCounts, UnfoldOptions, equal_edges, unfold};
 use stereology::volume::{Axis, Solid};
 
@@ -21,9 +22,9 @@ proptest! {
         let bodies = types.unit_bodies();
         let grains = mix(&lognormal_sizes(600, 0.25, seed).unwrap(), &[1.0], seed).unwrap();
         let period = box_for_fraction(&bodies, &grains, fraction).unwrap();
-        let packing = pack(&bodies, populate(&grains, &period, seed), &period, &PackOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
+        let packing = pack(&Arrangement::new(bodies, populate(&grains, &period, seed), period).unwrap(), &PackOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
         let number_density = 600.0 / period.volume();
-        let solid = Solid::new(bodies, packing.into_particles(), vec![[0.5; 3]; 600], period, [0.2; 3], None).unwrap();
+        let solid = Solid::new(packing.arrangement().clone(), vec![[0.5; 3]; 600], [0.2; 3], None).unwrap();
         let side = period.sides().x;
         let planes = 12;
         let sizes: Vec<f64> = [Axis::X, Axis::Y, Axis::Z]

@@ -7,7 +7,7 @@ use ndarray::Array4;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology_shape::{Body, Particle, PeriodicBox, Texture, TriangleMesh, UnitBody};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, Texture, TriangleMesh, UnitBody};
 use stereology_volume::{BakeOptions, Baked, CarveError, Residual, Solid};
 
 /// Four coloured balls in a box of side 10 that touch nothing.
@@ -28,7 +28,13 @@ fn balls() -> Solid {
     let colours = vec![[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9], [0.9, 0.9, 0.1]];
     let sphere = UnitBody::new(&Body::sphere(1.0).unwrap());
     let period = PeriodicBox::new(Vector3::repeat(10.0)).unwrap();
-    Solid::new(vec![sphere], particles, colours, period, [0.5; 3], None).unwrap()
+    Solid::new(
+        Arrangement::new(vec![sphere], particles, period).unwrap(),
+        colours,
+        [0.5; 3],
+        None,
+    )
+    .unwrap()
 }
 
 fn bake(solid: &Solid, mesh: &TriangleMesh, pixels: u32) -> Baked {
@@ -208,7 +214,13 @@ fn coarseness_is_told() {
         voxel: 0.5,
     };
     let period = PeriodicBox::new(Vector3::repeat(10.0)).unwrap();
-    let solid = Solid::new(vec![], vec![], vec![], period, [0.3; 3], Some(residual)).unwrap();
+    let solid = Solid::new(
+        Arrangement::new(vec![], vec![], period).unwrap(),
+        vec![],
+        [0.3; 3],
+        Some(residual),
+    )
+    .unwrap();
     let baked = bake(&solid, &TriangleMesh::cuboid([5.0; 3]), 96);
     assert!((baked.coarseness.unwrap() - baked.texel / 0.5).abs() < 1e-12);
     assert_eq!(bake(&balls(), &TriangleMesh::cuboid([5.0; 3]), 96).coarseness, None);

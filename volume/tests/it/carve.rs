@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use nalgebra::{Point3, UnitQuaternion, Vector3, center};
 use ndarray::Array4;
 use proptest::prelude::*;
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
+use stereology_shape::{Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody};
 use stereology_volume::{CarveError, CarveOptions, Carved, Residual, Solid};
 
 fn solid(size: f64) -> Solid {
@@ -27,10 +27,8 @@ fn solid(size: f64) -> Solid {
     };
     let period = PeriodicBox::new(Vector3::repeat(20.0)).unwrap();
     Solid::new(
-        vec![sphere],
-        vec![particle],
+        Arrangement::new(vec![sphere], vec![particle], period).unwrap(),
         vec![[0.9, 0.2, 0.1]],
-        period,
         [0.3, 0.3, 0.8],
         Some(residual),
     )

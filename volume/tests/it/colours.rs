@@ -17,20 +17,8 @@ fn textured(seed: u64) -> Solid {
         particles: Array4::from_shape_fn((8, 16, 4, 3), |(z, y, x, c)| value(5.0, z, y, x, c)),
         voxel: 0.5,
     };
-    let (bodies, particles, colours) = (
-        plain.bodies().to_vec(),
-        plain.particles().to_vec(),
-        plain.colours().to_vec(),
-    );
-    Solid::new(
-        bodies,
-        particles,
-        colours,
-        *plain.period(),
-        plain.binder(),
-        Some(residual),
-    )
-    .unwrap()
+    let colours = plain.colours().to_vec();
+    Solid::new(plain.arrangement().clone(), colours, plain.binder(), Some(residual)).unwrap()
 }
 
 /// At the centre of a residual voxel every lookup gives mean + that voxel, whatever the period it is in.

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::LazyLock;
-use stereology_shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology_volume::Solid;
 
 /// Positions and sizes that do not overlap, in a box of sides that are exact in binary, so that a step of a period is exact.
@@ -45,10 +45,8 @@ pub(crate) fn solid_of(bodies: &[Body], placed: &[(Point3<f64>, f64)], sides: [f
         .map(|_| [rng.random(), rng.random(), rng.random()])
         .collect();
     Solid::new(
-        bodies,
-        particles,
+        Arrangement::new(bodies, particles, PeriodicBox::new(sides.into()).unwrap()).unwrap(),
         colours,
-        PeriodicBox::new(sides.into()).unwrap(),
         [0.5, 0.6, 0.7],
         None,
     )

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::Array3;
 use proptest::prelude::*;
-use stereology_shape::{Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
+use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
 use stereology_volume::{CarveOptions, Solid, SolidError};
 
 /// A bubble and a rock beside it, in a box of side 20.
@@ -23,7 +23,13 @@ fn foam(size: f64) -> Solid {
     };
     let particles = vec![at(1, 4.0, 2.5), at(0, size, 12.0)];
     let period = PeriodicBox::new(Vector3::repeat(20.0)).unwrap();
-    Solid::new(bodies, particles, vec![[0.5; 3]; 2], period, [0.8; 3], None).unwrap()
+    Solid::new(
+        Arrangement::new(bodies, particles, period).unwrap(),
+        vec![[0.5; 3]; 2],
+        [0.8; 3],
+        None,
+    )
+    .unwrap()
 }
 
 proptest! {

@@ -9,7 +9,9 @@ use std::f64::consts::PI;
 use std::fs;
 use std::ops::ControlFlow;
 use stereology_grid::{Format, GridError, read_npy};
-use stereology_shape::{Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation};
+use stereology_shape::{
+    Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation,
+};
 use stereology_volume::{Axis, Channel, Lookup, Residual, SlicePlane, Solid, VoxelGrid};
 
 fn ids(solid: &Solid, n: usize) -> Array3<u32> {
@@ -153,10 +155,15 @@ fn rows_of_voxels_are_their_points() {
         voxel: 1.0,
     };
     let period = PeriodicBox::new(Vector3::new(8.0, 4.0, 8.0)).unwrap();
-    let solid = Solid::new(bodies, particles, colours, period, [0.5; 3], Some(residual))
-        .unwrap()
-        .with_voids(&[1])
-        .unwrap();
+    let solid = Solid::new(
+        Arrangement::new(bodies, particles, period).unwrap(),
+        colours,
+        [0.5; 3],
+        Some(residual),
+    )
+    .unwrap()
+    .with_voids(&[1])
+    .unwrap();
     for lookup in [Lookup::Nearest, Lookup::Trilinear, Lookup::VarianceKept] {
         let solid = solid.clone().with_lookup(lookup);
         for n in [3, 32, 61] {
@@ -243,7 +250,13 @@ fn a_filtered_volume_has_the_solids_mean_colour() {
     };
     let period = PeriodicBox::new(Vector3::repeat(10.0)).unwrap();
     let sphere = UnitBody::new(&Body::sphere(1.0).unwrap());
-    let solid = Solid::new(vec![sphere], vec![particle], vec![[1.0; 3]], period, [0.0; 3], None).unwrap();
+    let solid = Solid::new(
+        Arrangement::new(vec![sphere], vec![particle], period).unwrap(),
+        vec![[1.0; 3]],
+        [0.0; 3],
+        None,
+    )
+    .unwrap();
     let share = PI * 36.0 / 1000.0;
     for (voxels, samples) in [(4, 16), (8, 8), (16, 4)] {
         let grid = VoxelGrid {

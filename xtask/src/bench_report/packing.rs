@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
 use stereology::anneal::{Grain, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, pack, populate};
-use stereology::shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+use stereology::shape::{Arrangement, Body, ClosedMesh, TriangleMesh, UnitBody};
 
 use super::{Bench, Row, Section};
 
@@ -101,6 +101,8 @@ fn packed(bench: &Bench, bodies: &[UnitBody], sizes: &[f64], fraction: f64) -> R
         let period = box_for_fraction(bodies, &grains, fraction)?;
         let start = populate(&grains, &period, 1);
         let options = PackOptions::default();
-        Ok(pack(bodies, start, &period, &options, &|_| ControlFlow::Continue(()))?)
+        Ok(pack(&Arrangement::new(bodies, start, period)?, &options, &|_| {
+            ControlFlow::Continue(())
+        })?)
     })
 }

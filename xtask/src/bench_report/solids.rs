@@ -12,7 +12,7 @@ use ndarray::Array4;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::grid::Format;
-use stereology::shape::{Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
+use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology::volume::{Channel, Residual, Solid};
 
 use super::{Bench, Row, Section};
@@ -84,10 +84,8 @@ fn rocks(along: u32) -> Result<Solid> {
     let bodies = [1, 2].map(|seed| UnitBody::new(&Body::rock(seed))).to_vec();
     let period = PeriodicBox::new(Vector3::repeat(SIDE))?;
     Ok(Solid::new(
-        bodies,
-        particles,
+        Arrangement::new(bodies, particles, period)?,
         colours,
-        period,
         [0.5; 3],
         Some(residual),
     )?)

@@ -19,7 +19,7 @@ use stereology::pipeline::{
 use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
 use stereology::render::{Camera, RenderOptions, render_mesh};
 use stereology::segment::{Profile, SegmentOptions, Segmentation, segment};
-use stereology::shape::PeriodicBox;
+use stereology::shape::{Arrangement, PeriodicBox};
 use stereology::unfold::{Bootstrap, UnfoldOptions};
 use stereology::volume::{Axis, Residual, SlicePlane, Solid};
 
@@ -80,10 +80,8 @@ fn known(types: &ParticleTypes) -> Result<Solid> {
         voxel: 2.5,
     };
     Ok(Solid::new(
-        bodies,
-        packing.particles().to_vec(),
+        packing.arrangement().clone(),
         colours,
-        period,
         BINDER,
         Some(residual),
     )?)
@@ -92,9 +90,7 @@ fn known(types: &ParticleTypes) -> Result<Solid> {
 fn packed(types: &ParticleTypes, grains: &[Grain], period: &PeriodicBox) -> Result<Packing> {
     let start = populate(grains, period, SEED);
     Ok(pack(
-        &types.unit_bodies(),
-        start,
-        period,
+        &Arrangement::new(types.unit_bodies(), start, *period)?,
         &PackOptions::default(),
         &|_| ControlFlow::Continue(()),
     )?)
@@ -149,10 +145,8 @@ fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensi
         &|_| ControlFlow::Continue(()),
     )?;
     Ok(Solid::new(
-        types.unit_bodies(),
-        packing.particles().to_vec(),
+        packing.arrangement().clone(),
         particle_colours(&packing, &profiles, 1.0, SEED),
-        drawn.period,
         first.binder.colour.map(|c| c as f32),
         Some(details.residual),
     )?)

@@ -17,7 +17,7 @@ use stereology::anneal::{
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{ParticleTypes, UnfoldingBins};
 use stereology::render::{BlockOptions, render_block};
-use stereology::shape::{PeriodicBox, UnitBody};
+use stereology::shape::{Arrangement, PeriodicBox};
 use stereology::unfold::{Bootstrap, Method, ProfileCounts, UnfoldOptions, Unfolding, equal_edges, unfold};
 use stereology::volume::{Axis, Solid};
 
@@ -89,12 +89,9 @@ fn experiment(index: usize) -> Result<Experiment> {
 }
 
 fn packed(types: &ParticleTypes, grains: &[Grain], seed: u64) -> Result<Packing> {
-    let bodies: Vec<UnitBody> = types.unit_bodies();
     let period = PeriodicBox::new(Vector3::repeat(SIDE))?;
     Ok(pack(
-        &bodies,
-        populate(grains, &period, seed),
-        &period,
+        &Arrangement::new(types.unit_bodies(), populate(grains, &period, seed), period)?,
         &PackOptions::default(),
         &|_| ControlFlow::Continue(()),
     )?)
@@ -116,10 +113,8 @@ fn coloured(packing: &Packing) -> Result<Solid> {
         .map(|_| hues[rng.random_range(0..hues.len())])
         .collect();
     Ok(Solid::new(
-        packing.bodies().to_vec(),
-        packing.particles().to_vec(),
+        packing.arrangement().clone(),
         colours,
-        *packing.period(),
         [0.78, 0.77, 0.74],
         None,
     )?)

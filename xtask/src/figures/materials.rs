@@ -14,7 +14,7 @@ use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{Extent, ParticleTypes, SynthesisOptions, synthesize};
 use stereology::render::{BlockOptions, Camera, RenderOptions};
 use stereology::sample;
-use stereology::shape::{PeriodicBox, TriangleMesh};
+use stereology::shape::{Arrangement, PeriodicBox, TriangleMesh};
 use stereology::volume::{Axis, SlicePlane, Solid, turned};
 
 use super::carvings;
@@ -128,16 +128,18 @@ impl Material {
             .collect();
         scale_to_fraction(&bodies, &mut grains, &period, self.fraction)?;
         let start = populate(&grains, &period, 12);
-        let packing = pack(&bodies, start, &period, &PackOptions::default(), &|_| {
-            ControlFlow::Continue(())
-        })?;
+        let packing = pack(
+            &Arrangement::new(bodies, start, period)?,
+            &PackOptions::default(),
+            &|_| ControlFlow::Continue(()),
+        )?;
         let mut rng = ChaCha8Rng::seed_from_u64(12);
         let colours = packing.particles().iter().map(|_| {
             let light = 0.08 * (rng.random::<f32>() - 0.5);
             self.colours[rng.random_range(0..self.colours.len())].map(|c| c + light)
         });
         let colours = colours.collect();
-        let solid = Solid::new(bodies, packing.particles().to_vec(), colours, period, self.binder, None)?;
+        let solid = Solid::new(packing.arrangement().clone(), colours, self.binder, None)?;
         let plane = SlicePlane::across(Axis::Z, 0.5 * DEPTH);
         let ids = solid.slice_ids(&plane, PHOTO, PHOTO, 1.0)?;
         photograph(&solid.slice(&plane, PHOTO, PHOTO, 1.0)?, &ids)

@@ -12,7 +12,7 @@ use stereology::anneal::{
 };
 use stereology::pictures::picture_of_packing;
 use stereology::render::RenderOptions;
-use stereology::shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
+use stereology::shape::{Arrangement, Body, ClosedMesh, TriangleMesh, UnitBody};
 
 use super::bars::{BLUE, GREEN, RED, table};
 
@@ -108,9 +108,11 @@ fn packed(bodies: &[UnitBody], count: usize, fraction: f64, options: &PackOption
     let shares = vec![1.0; bodies.len()];
     let grains = mix(&lognormal_sizes(count, SIGMA, 0)?, &shares, 0)?;
     let period = box_for_fraction(bodies, &grains, fraction)?;
-    Ok(pack(bodies, populate(&grains, &period, 0), &period, options, &|_| {
-        ControlFlow::Continue(())
-    })?)
+    Ok(pack(
+        &Arrangement::new(bodies, populate(&grains, &period, 0), period)?,
+        options,
+        &|_| ControlFlow::Continue(()),
+    )?)
 }
 
 fn radial(packing: &Packing) -> RadialDistribution {

@@ -5,9 +5,9 @@
 )]
 
 use ndarray::{ArrayView2, ArrayView3, Axis};
+use stereology_imaging::distance_to_other_region;
 
 use crate::contact::{ContactDistribution, MOST_BINS};
-use crate::distance_transform::distance_to_other_region;
 use crate::error::MicrogeometryError;
 
 /// How distances are measured and counted.
@@ -95,39 +95,6 @@ pub fn contact_of_volume(
     options: &EstimateOptions,
 ) -> Result<ContactDistribution, MicrogeometryError> {
     estimate(positive, options, "the volume")
-}
-
-/// The threshold that parts grey values best: the largest variance between the two parts (Otsu 1979). Values above it are white. `None` if all values are equal.
-///
-/// ```
-/// use stereology_microgeometry::otsu;
-/// assert_eq!(otsu([10, 12, 11, 200, 210]), Some(12));
-/// assert_eq!(otsu([7, 7]), None);
-/// ```
-#[must_use]
-pub fn otsu(values: impl IntoIterator<Item = u8>) -> Option<u8> {
-    let mut counts = [0_u64; 256];
-    for value in values {
-        counts[usize::from(value)] += 1;
-    }
-    let total: u64 = counts.iter().sum();
-    let sum: f64 = (0..256).map(|v| v as f64 * counts[v] as f64).sum();
-    let (mut below, mut sum_below, mut best) = (0_u64, 0.0, None);
-    for value in 0..255_u8 {
-        let count = counts[usize::from(value)];
-        below += count;
-        sum_below += f64::from(value) * count as f64;
-        let above = total - below;
-        if below == 0 || above == 0 || count == 0 {
-            continue;
-        }
-        let gap = sum_below / below as f64 - (sum - sum_below) / above as f64;
-        let between = below as f64 * above as f64 * gap * gap;
-        if best.is_none_or(|(most, _)| between > most) {
-            best = Some((between, value));
-        }
-    }
-    best.map(|(_, value)| value)
 }
 
 fn estimate(

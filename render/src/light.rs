@@ -2,26 +2,6 @@
 
 use nalgebra::{UnitVector3, Vector3};
 
-/// Encoded value / 255 to linear light (IEC 61966-2-1); negative values, which a residual may leave, are black.
-pub(crate) fn linear(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded.max(0.0) / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// Linear light to an encoded byte; what is brighter than white is white.
-#[allow(clippy::cast_possible_truncation, reason = "clamped to the range of u8")]
-pub(crate) fn encoded_byte(linear: f32) -> u8 {
-    let value = if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * value).round().clamp(0.0, 255.0) as u8
-}
-
 /// Light of unit strength: a face that looks up and is not hidden gets 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Studio {
@@ -121,15 +101,8 @@ fn across(n: &UnitVector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Studio, about, encoded_byte, linear};
+    use super::{Studio, about};
     use nalgebra::Vector3;
-
-    #[test]
-    fn bytes_survive_linear_light() {
-        for byte in 0..=255_u8 {
-            assert_eq!(encoded_byte(linear(f32::from(byte) / 255.0)), byte);
-        }
-    }
 
     /// A face that looks up gets 1: the sky over it integrated in many directions, and the key.
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::camera::{Camera, View};
 use crate::hollows::Hollows;
-use crate::light::{Studio, linear};
+use crate::light::Studio;
 use crate::paths::{Colour, World};
 use crate::scene::Scene;
 use crate::tile::Picture;
@@ -11,6 +11,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use stereology_imaging::linear;
 use stereology_shape::TriangleMesh;
 
 /// Pictures have at most this many pixels.

@@ -3,9 +3,10 @@
 #![allow(clippy::cast_possible_truncation, reason = "light is f32 where it is seen")]
 
 use crate::hollows::{Hollows, Start};
-use crate::light::{Studio, about, linear};
+use crate::light::{Studio, about};
 use crate::scene::{Scene, Surface};
 use nalgebra::{Point3, UnitVector3, Vector3};
+use stereology_imaging::linear;
 
 pub(crate) type Colour<'a> = &'a (dyn Fn(&Point3<f64>) -> [f32; 3] + Sync);
 

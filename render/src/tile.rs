@@ -7,9 +7,9 @@
 
 use crate::camera::View;
 use crate::hollows::Start;
-use crate::light::encoded_byte;
 use crate::paths::{Chance, GROUND_REACH, Met, Rgb, World};
 use nalgebra::{Point3, Vector3};
+use stereology_imaging::encoded_byte;
 
 /// Light is averaged over squares of this many places each way.
 const SQUARE: usize = 8;

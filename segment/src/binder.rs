@@ -124,12 +124,13 @@ impl BinderModel {
     /// # Examples
     ///
     /// ```
-    /// use stereology_segment::{BinderModel, encoded_image, smooth};
+    /// use stereology_imaging::gaussian_filter_rgb;
+    /// use stereology_segment::{BinderModel, encoded_image};
     ///
     /// let photo = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([90 + ((x * 7919 ^ y * 104_729) % 21) as u8; 3]));
     /// let picture = encoded_image(&photo);
     /// let binder = BinderModel::fit(&picture, 0);
-    /// assert!(binder.refit(&smooth(&picture, 2.0)).spread() < 0.5 * binder.spread());
+    /// assert!(binder.refit(&gaussian_filter_rgb(picture.view(), 2.0)).spread() < 0.5 * binder.spread());
     /// ```
     #[must_use]
     pub fn refit(&self, picture: &Array2<[f32; 3]>) -> Self {

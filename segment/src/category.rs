@@ -2,10 +2,10 @@
 
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
+use stereology_imaging::lab;
 
 use crate::{
     kmeans::{Clusters, kmeans, silhouette},
-    lab::lab,
     options::CategoryCount,
     profile::Profile,
 };

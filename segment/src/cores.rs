@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 
 use ndarray::Array2;
-
-use crate::{distance::distance_transform, pieces::connected_pieces};
+use stereology_imaging::{connected_components, distance_transform};
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 pub(crate) const CORE_DEPTH: f32 = 3.0;
@@ -52,8 +51,8 @@ pub(crate) struct Cores {
 impl Cores {
     pub(crate) fn new(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8, core_depth: f32) -> Self {
         let (height, width) = mask.dim();
-        let depth = distance_transform(mask);
-        let (pieces, count) = connected_pieces(mask, |m| m);
+        let depth = distance_transform(mask.view());
+        let (pieces, count) = connected_components(mask.view(), |m| m);
         let mut largest = vec![0.0_f32; count as usize + 1];
         for (&piece, &d) in pieces.iter().zip(&depth) {
             let l = &mut largest[piece as usize];
@@ -232,7 +231,7 @@ mod tests {
             let height = inside.len() / width;
             let mask = Array2::from_shape_fn((height, width), |(y, x)| inside[y * width + x]);
             let deviation = Array2::from_shape_fn(mask.dim(), |(y, x)| [(x * 7 + y * 3) as f32 % 11.0, x as f32, 1.0]);
-            let depth = distance_transform(&mask);
+            let depth = distance_transform(mask.view());
             let square = |y: usize, x: usize, r: usize| {
                 (y.saturating_sub(r)..(y + r + 1).min(height)).flat_map(move |j| (x.saturating_sub(r)..(x + r + 1).min(width)).map(move |i| (j, i)))
             };

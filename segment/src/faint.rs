@@ -1,13 +1,12 @@
 //! Faint particles: what differs from the binder by less than its texture, seen where texture is averaged away.
 
 use ndarray::Array2;
+use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
 
 use crate::{
     binder::{BinderModel, length},
-    pieces::connected_pieces,
     refine::half_contrast,
     regions::{hysteresis, neighbours8, open},
-    smoothing::{smooth, smooth_field},
 };
 
 /// Pixels in the side of a cell of the coarse picture.
@@ -79,7 +78,7 @@ pub fn faint_regions(
     }
     faint.zip_mut_with(mask, |f, m| *f &= !m);
     open(&mut faint);
-    let (pieces, count) = connected_pieces(&faint, |f| f);
+    let (pieces, count) = connected_components(faint.view(), |f| f);
     let mut areas = vec![0_usize; count as usize + 1];
     pieces.iter().for_each(|&p| areas[p as usize] += 1);
     Array2::from_shape_fn(dim, |p| {
@@ -114,8 +113,8 @@ fn averaged(picture: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool
         }
         sum.iter_mut().for_each(|s| *s /= count);
     }
-    let sums = smooth(&sums, SIGMA);
-    let weights = smooth_field(&open_cell.mapv(|o| f32::from(u8::from(o))), SIGMA);
+    let sums = gaussian_filter_rgb(sums.view(), SIGMA);
+    let weights = gaussian_filter(open_cell.mapv(|o| f32::from(u8::from(o))).view(), SIGMA);
     Array2::from_shape_fn(cells, |(j, i)| {
         let weight = weights[[j, i]];
         let light = binder.light(i * CELL, j * CELL);

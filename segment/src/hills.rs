@@ -3,8 +3,7 @@
 use std::cmp::Reverse;
 
 use ndarray::Array2;
-
-use crate::pieces::find;
+use stereology_imaging::DisjointSets;
 
 /// Steps of height that saddles are sorted by.
 const STEPS: f32 = 64.0;
@@ -122,10 +121,10 @@ impl Hills {
             let (pixel, height) = self.tops[hill as usize];
             (height, Reverse(pixel))
         };
-        let mut parent: Vec<u32> = (0..self.tops.len() as u32).collect();
+        let mut sets = DisjointSets::new(self.tops.len() as u32);
         let mut ended = vec![false; self.tops.len()];
         for &(saddle, a, b) in &self.saddles {
-            let (a, b) = (find(&mut parent, a), find(&mut parent, b));
+            let (a, b) = (sets.root(a), sets.root(b));
             if a == b {
                 continue;
             }
@@ -133,9 +132,9 @@ impl Hills {
             let (high, low) = if rank(a) > rank(b) { (a, b) } else { (b, a) };
             let (pixel, height) = self.tops[low as usize];
             ended[low as usize] = height - saddle < h(self.place(pixel), height);
-            parent[low as usize] = high;
+            sets.join(high, low);
         }
-        let mut standing: Vec<u32> = (0..parent.len() as u32).filter(|&i| !ended[i as usize]).collect();
+        let mut standing: Vec<u32> = (0..self.tops.len() as u32).filter(|&i| !ended[i as usize]).collect();
         standing.sort_by(|&a, &b| {
             let ((p, height), (q, other)) = (self.tops[a as usize], self.tops[b as usize]);
             other.total_cmp(&height).then(p.cmp(&q))
@@ -151,19 +150,19 @@ impl Hills {
 
     /// That number, for each hill.
     fn named(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
-        let mut parent: Vec<u32> = (0..self.tops.len() as u32).collect();
+        let mut sets = DisjointSets::new(self.tops.len() as u32);
         let mut label = vec![0_u32; self.tops.len()];
         numbers.into_iter().for_each(|(hill, n)| label[hill as usize] = n);
         for &(_, a, b) in &self.saddles {
-            let (a, b) = (find(&mut parent, a), find(&mut parent, b));
+            let (a, b) = (sets.root(a), sets.root(b));
             let [first, second] = [label[a as usize], label[b as usize]];
             if a != b && (first == 0 || second == 0) {
-                parent[b as usize] = a;
+                sets.join(a, b);
                 label[a as usize] = first.max(second);
             }
         }
-        (0..parent.len() as u32)
-            .map(|i| label[find(&mut parent, i) as usize])
+        (0..self.tops.len() as u32)
+            .map(|i| label[sets.root(i) as usize])
             .collect()
     }
 
@@ -269,6 +268,7 @@ mod tests {
     use crate::regions::neighbours8;
     use proptest::prelude::*;
     use std::collections::BinaryHeap;
+    use stereology_imaging::{distance_transform, gaussian_filter};
 
     /// Pixels from the highest down, joined one by one.
     fn maxima(field: &Array2<f32>, h: f32) -> Array2<u32> {
@@ -277,16 +277,17 @@ mod tests {
         let height = |i: u32| field[at(i)];
         let mut order: Vec<u32> = (0..field.len() as u32).filter(|&i| height(i) > 0.0).collect();
         order.sort_by(|&a, &b| height(b).total_cmp(&height(a)).then(a.cmp(&b)));
-        let mut parent = vec![NONE; field.len()];
+        let mut sets = DisjointSets::new(field.len() as u32);
+        let mut reached = vec![false; field.len()];
         let mut ended = vec![false; field.len()];
         for &i in &order {
-            parent[i as usize] = i;
+            reached[i as usize] = true;
             for q in neighbours8(at(i), field.dim()) {
                 let q = (q[0] * width + q[1]) as u32;
-                if parent[q as usize] == NONE {
+                if !reached[q as usize] {
                     continue;
                 }
-                let (a, b) = (find(&mut parent, q), find(&mut parent, i));
+                let (a, b) = (sets.root(q), sets.root(i));
                 let (high, low) = if (height(a), Reverse(a)) > (height(b), Reverse(b)) {
                     (a, b)
                 } else {
@@ -294,7 +295,7 @@ mod tests {
                 };
                 if high != low {
                     ended[low as usize] |= height(low) - height(i) < h;
-                    parent[low as usize] = high;
+                    sets.join(high, low);
                 }
             }
         }
@@ -338,7 +339,7 @@ mod tests {
                 .iter()
                 .any(|&(j, i, r)| (y as f64 - j as f64).hypot(x as f64 - i as f64) < r as f64 + 4.0)
         });
-        crate::smoothing::smooth_field(&crate::distance::distance_transform(&mask).mapv(|d| d.min(1e4)), 1.0)
+        gaussian_filter(distance_transform(mask.view()).mapv(|d| d.min(1e4)).view(), 1.0)
     }
 
     proptest! {

@@ -2,10 +2,11 @@
 
 use image::RgbImage;
 use ndarray::Array2;
+use stereology_imaging::connected_components;
 
 use crate::{
-    error::SegmentError, finding::Finding, options::SegmentOptions, pieces::connected_pieces, profile::distinct,
-    regions::neighbours4, segmentation::Segmentation,
+    error::SegmentError, finding::Finding, options::SegmentOptions, profile::distinct, regions::neighbours4,
+    segmentation::Segmentation,
 };
 
 /// Pieces from which a map of one or two numbers is a mask.
@@ -46,7 +47,7 @@ impl Segmentation {
             });
         }
         let largest = labels.iter().copied().max().unwrap_or(0);
-        let (pieces, count) = connected_pieces(&labels, |l| l != 0);
+        let (pieces, count) = connected_components(labels.view(), |l| l != 0);
         if count == 0 {
             return Err(SegmentError::NoLabels);
         }

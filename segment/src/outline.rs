@@ -1,8 +1,7 @@
 //! Outlines of labels: from a label map to rings of corners and back.
 
 use ndarray::Array2;
-
-use crate::pieces::connected_pieces;
+use stereology_imaging::connected_components;
 
 /// Corners of a closed line, (x, y) in pixels from the photo's upper left corner, the first not repeated at the end.
 pub type Ring = Vec<[f64; 2]>;
@@ -48,7 +47,7 @@ impl Outline {
 /// ```
 #[must_use]
 pub fn outlines(labels: &Array2<u32>) -> Vec<Outline> {
-    let (pieces, count) = connected_pieces(labels, |l| l != 0);
+    let (pieces, count) = connected_components(labels.view(), |l| l != 0);
     let (height, width) = labels.dim();
     let mut rings: Vec<(u32, Vec<Ring>)> = vec![(0, Vec::new()); count as usize + 1];
     let mut seen = Array2::from_elem(labels.dim(), false);

@@ -1,8 +1,9 @@
-//! Photographs in files.
+//! Photographs in files, and as arrays.
 
 use std::{io::Cursor, path::Path};
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
+use ndarray::Array2;
 
 use crate::{error::SegmentError, finding::Finding};
 
@@ -100,6 +101,23 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
     Ok(PhotoFile {
         findings: (through > 0).then(finding).into_iter().collect(),
         photo: over_white(picture),
+    })
+}
+
+/// Values of every pixel / 255, axes (y, x).
+///
+/// # Examples
+///
+/// ```
+/// let photo = image::RgbImage::from_pixel(2, 1, image::Rgb([0, 51, 255]));
+/// assert_eq!(stereology_segment::encoded_image(&photo)[[0, 1]], [0.0, 0.2, 1.0]);
+/// ```
+#[must_use]
+pub fn encoded_image(photo: &RgbImage) -> Array2<[f32; 3]> {
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    let mut pixels = photo.pixels();
+    Array2::from_shape_simple_fn((height, width), || {
+        pixels.next().map_or([0.0; 3], |p| p.0.map(|v| f32::from(v) / 255.0))
     })
 }
 

@@ -1,12 +1,12 @@
 //! What to know before trusting a segmentation: is there a binder, are there enough profiles, would other thresholds find others?
 
 use ndarray::Array2;
+use stereology_imaging::connected_components;
 
 use crate::{
     finding::Finding,
     hills::Hills,
     options::{EdgeRule, SegmentOptions},
-    pieces::connected_pieces,
     refine::half_contrast,
     regions::{fill_holes, hysteresis, open},
     segmentation::{SHARP, Segmentation, drop_faint},
@@ -113,7 +113,7 @@ pub(crate) fn counts_by_threshold(
         open(&mut mask);
         mask = half_contrast(&deviation, &mask, blur);
         open(&mut mask);
-        let (parts, _) = connected_pieces(&mask, |m| m);
+        let (parts, _) = connected_components(mask.view(), |m| m);
         let mut labels = split_by_shape(&parts, options.rise);
         drop_faint(&mut labels, &distance, &deviation, f * high, options.min_area);
         let mut areas = vec![0_usize; 1 + labels.iter().copied().max().unwrap_or(0) as usize];

@@ -1,8 +1,7 @@
 //! Regions of a mask: hysteresis, holes, opening.
 
 use ndarray::Array2;
-
-use crate::pieces::{Contact, connected_pieces, pieces};
+use stereology_imaging::{Connectivity, connected_components, label_components};
 
 /// Pixels of at least `low` that hang together (8 neighbours) with one of at least `high`.
 ///
@@ -16,7 +15,7 @@ use crate::pieces::{Contact, connected_pieces, pieces};
 #[must_use]
 pub fn hysteresis(distance: &Array2<f32>, low: f32, high: f32) -> Array2<bool> {
     let candidates = distance.mapv(|z| z >= low);
-    let (pieces, count) = pieces(&candidates, |c| c, Contact::Corners);
+    let (pieces, count) = label_components(candidates.view(), |c| c, Connectivity::Corners);
     let mut strong = vec![false; count as usize + 1];
     for (&piece, &z) in pieces.iter().zip(distance) {
         strong[piece as usize] |= z >= high;
@@ -36,8 +35,8 @@ pub fn hysteresis(distance: &Array2<f32>, low: f32, high: f32) -> Array2<bool> {
 /// assert!(ring[[2, 2]] && !ring[[0, 0]]);
 /// ```
 pub fn fill_holes(mask: &mut Array2<bool>, fill: impl Fn(usize, usize) -> bool) {
-    let (outside, count) = connected_pieces(mask, |m| !m);
-    let (inside, pieces) = connected_pieces(mask, |m| m);
+    let (outside, count) = connected_components(mask.view(), |m| !m);
+    let (inside, pieces) = connected_components(mask.view(), |m| m);
     let mut areas = vec![0_usize; pieces as usize + 1];
     inside.iter().for_each(|&i| areas[i as usize] += 1);
     let mut holes = vec![(0_usize, 0_usize); count as usize + 1];

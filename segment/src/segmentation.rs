@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use image::RgbImage;
 use ndarray::Array2;
+use stereology_imaging::{connected_components, gaussian_filter_rgb, lab_image};
 
 use crate::{
     binder::{BinderModel, length},
@@ -11,14 +12,12 @@ use crate::{
     error::SegmentError,
     faint::faint_regions,
     finding::Finding,
-    lab::{encoded_image, lab_image},
     options::{BinderChoice, Holes, SegmentOptions},
-    pieces::connected_pieces,
+    photo::encoded_image,
     profile::{Index, Profile, Window, measure, size_of_area, weigh},
     quality::{LEAST_SHARE, counts_by_rise, counts_by_threshold},
     refine::half_contrast,
     regions::{fill_holes, hysteresis, open},
-    smoothing::smooth,
     split::{contrast_depth, fill_label_holes, hills_of, rising, shape_depth, split_by_colour},
     tones::{TONE_DISTANCE, TwoTones, densest, main_colours, mean_depth},
 };
@@ -63,7 +62,7 @@ type Progress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 
 /// Finds the profiles of particles in a photo of a section.
 ///
-/// The steps, each a function of its own: [`encoded_image`] and [`smooth`]; [`BinderModel`], whose colour and light are fitted robustly; [`hysteresis`] of the distance to it, [`fill_holes`], [`open`];
+/// The steps, each a function of its own: [`encoded_image`] and [`gaussian_filter_rgb`]; [`BinderModel`], whose colour and light are fitted robustly; [`hysteresis`] of the distance to it, [`fill_holes`], [`open`];
 /// [`half_contrast`]; [`split_by_colour`](crate::split_by_colour), [`split_by_shape`](crate::split_by_shape); small profiles dropped, edges weighed, colours put in categories.
 ///
 /// # Errors
@@ -100,7 +99,7 @@ pub fn segment(
         ControlFlow::Break(()) => Err(SegmentError::Cancelled),
     };
     report(0.0)?;
-    let colours = smooth(&encoded_image(photo), options.smoothing);
+    let colours = gaussian_filter_rgb(encoded_image(photo).view(), options.smoothing);
     report(0.15)?;
     let mut binder = match options.binder {
         BinderChoice::Found => BinderModel::fit(&colours, options.seed),
@@ -131,7 +130,10 @@ pub fn segment(
     let mut clear = connected && stands_out(&distance, low, high);
     let (mut find_faint, mut vague, mut one_tone) = (true, false, false);
     if !clear && !given {
-        let even = binder.even_light(&smooth(&encoded_image(photo), 0.5 * options.smoothing));
+        let even = binder.even_light(&gaussian_filter_rgb(
+            encoded_image(photo).view(),
+            0.5 * options.smoothing,
+        ));
         let tones = TwoTones::find(&even, options.seed).filter(|t| t.apart() > TWO_TONES);
         let two = tones.and_then(|tones| {
             let binder = tones.binder(&even);
@@ -183,7 +185,7 @@ pub fn segment(
     fill(&mut mask);
     open(&mut mask);
     report(0.6)?;
-    let parts = split_by_colour(&lab_image(&colours), &mask, options.seed);
+    let parts = split_by_colour(&lab_image(colours.view()), &mask, options.seed);
     report(0.75)?;
     let depth = if one_tone {
         contrast_depth(&distance, &parts, CLEAR * TONE_DISTANCE)
@@ -332,7 +334,7 @@ fn surrounds(mask: &Array2<bool>) -> bool {
 
 /// Share of a mask in its largest piece.
 fn share_of_largest(mask: &Array2<bool>) -> f64 {
-    let (pieces, count) = connected_pieces(mask, |m| m);
+    let (pieces, count) = connected_components(mask.view(), |m| m);
     let mut areas = vec![0_usize; count as usize + 1];
     pieces.iter().for_each(|&p| areas[p as usize] += 1);
     let all: usize = areas[1..].iter().sum();

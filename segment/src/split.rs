@@ -1,15 +1,13 @@
 //! A mask into profiles: touching particles of different colours first, then by shape.
 
 use ndarray::Array2;
+use stereology_imaging::{DisjointSets, connected_components, distance_transform, gaussian_filter};
 
 use crate::{
     cores::{CORE_DEPTH, Cores},
-    distance::distance_transform,
     hills::Hills,
     kmeans::kmeans,
-    pieces::{connected_pieces, find},
     regions::neighbours4,
-    smoothing::smooth_field,
 };
 
 /// Colour groups looked for inside the mask.
@@ -101,7 +99,7 @@ pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -
     };
     let of_core: Vec<u32> = cores.known.iter().map(group).collect();
     let groups = cores.source.mapv(|i| of_core.get(i as usize).copied().unwrap_or(0));
-    let (mut parts, count) = connected_pieces(&groups, |g| g != 0);
+    let (mut parts, count) = connected_components(groups.view(), |g| g != 0);
     let (known, borders) = contacts(lab, &parts, count);
     let merged = merge(known, borders);
     parts.mapv_inplace(|p| merged[p as usize]);
@@ -114,7 +112,7 @@ type Border = ((u32, u32), u32);
 /// What is known of every part, and the borders between them by increasing numbers.
 fn contacts(lab: &Array2<[f32; 3]>, parts: &Array2<u32>, count: u32) -> (Vec<Part>, Vec<Border>) {
     let (height, width) = parts.dim();
-    let depth = distance_transform(&lined(parts));
+    let depth = distance_transform(lined(parts).view());
     let mut known = vec![Part::default(); count as usize + 1];
     let mut borders = Vec::new();
     let nowhere = vec![0; width];
@@ -160,7 +158,7 @@ fn gathered(mut borders: Vec<Border>) -> Vec<Border> {
 
 /// Joins touching parts, the most alike first, until all that touch differ; the surviving number of each part.
 fn merge(mut known: Vec<Part>, mut borders: Vec<Border>) -> Vec<u32> {
-    let mut name: Vec<u32> = (0..known.len() as u32).collect();
+    let mut sets = DisjointSets::new(known.len() as u32);
     let mut joined = true;
     while joined {
         joined = false;
@@ -183,17 +181,17 @@ fn merge(mut known: Vec<Part>, mut borders: Vec<Border>) -> Vec<u32> {
             let part = known[b as usize];
             known[a as usize].add(&part);
             known[a as usize].outline -= 2.0 * f64::from(length);
-            name[b as usize] = a;
+            sets.join(a, b);
             joined = true;
         }
         for ((a, b), _) in &mut borders {
-            let ends = (find(&mut name, *a), find(&mut name, *b));
+            let ends = (sets.root(*a), sets.root(*b));
             (*a, *b) = (ends.0.min(ends.1), ends.0.max(ends.1));
         }
         borders.retain(|((a, b), _)| a != b);
         borders = gathered(borders);
     }
-    (0..known.len() as u32).map(|i| find(&mut name, i)).collect()
+    (0..known.len() as u32).map(|i| sets.root(i)).collect()
 }
 
 /// How little two touching parts belong together; `None` if they are two particles.
@@ -249,7 +247,7 @@ pub fn split_by_shape(parts: &Array2<u32>, rise: [f32; 2]) -> Array2<u32> {
 
 /// Distance of parts to the outside and to one another.
 pub(crate) fn shape_depth(parts: &Array2<u32>) -> Array2<f32> {
-    distance_transform(&lined(parts))
+    distance_transform(lined(parts).view())
 }
 
 /// [`split_by_shape`] with another depth than the distance to the outside.
@@ -264,7 +262,7 @@ pub fn split_by_depth(parts: &Array2<u32>, depth: &Array2<f32>, rise: [f32; 2]) 
 
 /// Hills of the smoothed depth of parts. Walks up may start on the lines between parts, whose depth is 0 before smoothing.
 pub(crate) fn hills_of(parts: &Array2<u32>, depth: &Array2<f32>) -> Hills {
-    let mut depth = smooth_field(&depth.mapv(|d| d.min(DEEPEST)), 1.0);
+    let mut depth = gaussian_filter(depth.mapv(|d| d.min(DEEPEST)).view(), 1.0);
     depth.zip_mut_with(parts, |d, &part| *d = if part == 0 { 0.0 } else { *d });
     Hills::new(&depth, parts, |_| false)
 }
@@ -307,16 +305,16 @@ pub(crate) fn rising(
 #[must_use]
 pub fn contrast_depth(distance: &Array2<f32>, parts: &Array2<u32>, clear: f32) -> Array2<f32> {
     let mut mask = lined(parts);
-    let mut depth = distance_transform(&mask);
+    let mut depth = distance_transform(mask.view());
     mask.zip_mut_with(distance, |m, z| *m &= *z >= clear);
-    depth.zip_mut_with(&distance_transform(&mask), |d, c| *d = 0.5 * (*d + c));
+    depth.zip_mut_with(&distance_transform(mask.view()), |d, c| *d = 0.5 * (*d + c));
     depth
 }
 
 /// Gives holes enclosed by a single label to that label.
 pub(crate) fn fill_label_holes(labels: &mut Array2<u32>) {
     const SEVERAL: u32 = u32::MAX;
-    let (outside, count) = connected_pieces(labels, |l| l == 0);
+    let (outside, count) = connected_components(labels.view(), |l| l == 0);
     let mut owner = vec![0_u32; count as usize + 1];
     let (height, width) = labels.dim();
     for ((y, x), &o) in outside.indexed_iter().filter(|(_, o)| **o != 0) {

@@ -1,10 +1,10 @@
 //! The main colours of a photo, and its two tones where it has no more.
 
 use ndarray::Array2;
+use stereology_imaging::distance_transform;
 
 use crate::{
     binder::BinderModel,
-    distance::distance_transform,
     kmeans::{Clusters, kmeans, squared_distance},
     light::{Sample, sample},
 };
@@ -182,7 +182,7 @@ pub(crate) fn densest(picture: &Array2<[f32; 3]>) -> [f32; 3] {
 
 /// Mean distance of a mask's pixels to its outline: threads are shallow, particles deep.
 pub(crate) fn mean_depth(mask: &Array2<bool>) -> f64 {
-    let depths = distance_transform(mask);
+    let depths = distance_transform(mask.view());
     let inside = depths.iter().filter(|d| **d > 0.0 && d.is_finite());
     let (sum, count) = inside.fold((0.0, 0.0), |(sum, count), d| (sum + f64::from(*d), count + 1.0));
     sum / f64::max(count, 1.0)

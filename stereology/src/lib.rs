@@ -9,6 +9,7 @@
 //! | [`shape`] | What is this particle's volume, width, section? |
 //! | [`grid`] | How do arrays get into files that others read? |
 //! | [`spectrum`] | What frequencies does a field hold? |
+//! | [`imaging`] | Which pixels are connected, how far is each from the next region, what is its colour in Lab? |
 //! | [`kmatrix`] | How often does a random plane show a body at each size? |
 //! | [`unfold`] | Which particles per volume gave these profiles per area? |
 //! | [`segment`] | Where are the profiles in a photograph? |
@@ -54,6 +55,8 @@ pub use stereology_anneal as anneal;
 pub use stereology_exemplar as exemplar;
 #[cfg(feature = "grid")]
 pub use stereology_grid as grid;
+#[cfg(feature = "imaging")]
+pub use stereology_imaging as imaging;
 #[cfg(feature = "kmatrix")]
 pub use stereology_kmatrix as kmatrix;
 #[cfg(feature = "microgeometry")]

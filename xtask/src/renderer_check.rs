@@ -6,6 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use image::RgbImage;
 use ndarray::Array3;
+use stereology::imaging::{encoded_byte, linear};
 use stereology::render::{Camera, RenderOptions, render_mesh, sky_map};
 use stereology::shape::{TriangleMesh, write_mesh};
 
@@ -59,7 +60,7 @@ pub fn run(python: &Path, folder: &Path) -> Result<()> {
     let ours = render_mesh(&mesh, &|_| encoded, &camera, &options)?;
     ours.save(folder.join("ours.png"))?;
 
-    let linear = encoded.map(|value| ((value + 0.055) / 1.055).powf(2.4));
+    let reflectance = encoded.map(linear);
     let numbers = [
         camera.azimuth,
         camera.elevation,
@@ -72,7 +73,7 @@ pub fn run(python: &Path, folder: &Path) -> Result<()> {
         .args(["-c", SCRIPT])
         .arg(folder)
         .args(numbers.map(|number| number.to_string()))
-        .args(linear.map(|number| number.to_string()))
+        .args(reflectance.map(|number| number.to_string()))
         .status()
         .with_context(|| format!("{} cannot be run", python.display()))?;
     ensure!(status.success(), "Mitsuba failed; is it there (pip install mitsuba)?");
@@ -88,18 +89,9 @@ pub fn run(python: &Path, folder: &Path) -> Result<()> {
 }
 
 /// Differences over pixels that the object covers whole in both pictures.
-#[allow(clippy::cast_possible_truncation, reason = "clamped to the range of u8")]
 fn compare(ours: &RgbImage, theirs: &Array3<f32>, folder: &Path) -> Result<()> {
-    let encode = |linear: f32| {
-        let value = if linear <= 0.003_130_8 {
-            12.92 * linear
-        } else {
-            1.055 * linear.powf(1.0 / 2.4) - 0.055
-        };
-        (255.0 * value).round().clamp(0.0, 255.0)
-    };
     let picture = RgbImage::from_fn(SIDE, SIDE, |x, y| {
-        image::Rgb([0, 1, 2].map(|c| encode(theirs[[y as usize, x as usize, c]]) as u8))
+        image::Rgb([0, 1, 2].map(|c| encoded_byte(theirs[[y as usize, x as usize, c]])))
     });
     picture.save(folder.join("mitsuba.png"))?;
     // Without the object Mitsuba shows the sky and we show black: the background is told by our own.

@@ -6,8 +6,9 @@ use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3, ArrayD, Ix3};
 use serde_json::{Value, json};
 use stereology::grid::read_npy;
+use stereology::imaging::otsu;
 use stereology::microgeometry::{
-    self, ContactDistribution, EstimateOptions, Law, contact_of_picture, contact_of_volume, otsu,
+    self, ContactDistribution, EstimateOptions, Law, contact_of_picture, contact_of_volume,
 };
 use stereology::segment::{read_labels, read_photo};
 
@@ -193,10 +194,13 @@ impl Contact {
     fn threshold_for(&self, values: impl Iterator<Item = u8>, image: &Path) -> Result<f64, Failure> {
         match self.threshold {
             Some(threshold) => Ok(threshold),
-            None => otsu(values)
-                .map(f64::from)
-                .ok_or("all pixels have one grey value: there are no two regions to measure distances between")
-                .at(image),
+            None => {
+                let mut counts = [0_u64; 256];
+                values.for_each(|level| counts[usize::from(level)] += 1);
+                otsu(&counts)
+                    .ok_or("all pixels have one grey value: there are no two regions to measure distances between")
+                    .at(image)
+            }
         }
     }
 }

@@ -7,7 +7,8 @@ use ndarray::Array2;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology_segment::{EdgeRule, SegmentError, SegmentOptions, Segmentation, segment, smooth_field};
+use stereology_imaging::gaussian_filter;
+use stereology_segment::{EdgeRule, SegmentError, SegmentOptions, Segmentation, segment};
 
 use crate::drawn::{discs, photo};
 
@@ -260,7 +261,7 @@ fn dark_pores_and_dark_grains() {
     const SIDE: usize = 9 * CELL;
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let white = Array2::from_shape_fn((SIDE, SIDE), |_| rng.random::<f32>() - 0.5);
-    let mottle = smooth_field(&white, 2.0);
+    let mottle = gaussian_filter(white.view(), 2.0);
     let scatter = (mottle.iter().map(|v| v * v).sum::<f32>() / mottle.len() as f32).sqrt();
     let is_black = |x: usize, y: usize| (x / CELL + 9 * (y / CELL)) % 20 == 1;
     // Where four cells meet.

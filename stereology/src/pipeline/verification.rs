@@ -6,7 +6,8 @@ use crate::pipeline::{MeasuredProfiles, wasserstein};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
-use stereology_segment::{SegmentError, SegmentOptions, Segmentation, connected_pieces, segment};
+use stereology_imaging::connected_components;
+use stereology_segment::{SegmentError, SegmentOptions, Segmentation, segment};
 use stereology_volume::{Axis, SlicePlane, Solid, SolidError};
 
 /// Sections of the solid beside the photograph.
@@ -307,7 +308,7 @@ fn measure(
         Recipe::Segmented(options) => segment(&drawn.picture, options, progress),
         Recipe::Labelled(options) => {
             // Two images of one particle are two profiles.
-            let (labels, _) = connected_pieces(&drawn.labels, |id| id != 0);
+            let (labels, _) = connected_components(drawn.labels.view(), |id| id != 0);
             Segmentation::from_labels(&drawn.picture, labels, options)
         }
     };

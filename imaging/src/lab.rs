@@ -1,8 +1,9 @@
 //! CIE L\*a\*b\*: differences of colour as the eye sees them.
 
-use image::RgbImage;
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
+
+use crate::srgb::linear;
 
 /// White of the D65 illuminant, CIE XYZ.
 const WHITE: [f32; 3] = [0.950_47, 1.0, 1.088_83];
@@ -22,27 +23,39 @@ const WHITE: [f32; 3] = [0.950_47, 1.0, 1.088_83];
 /// # Examples
 ///
 /// ```
-/// let [l, a, b] = stereology_segment::lab([1.0, 1.0, 1.0]);
+/// let [l, a, b] = stereology_imaging::lab([1.0, 1.0, 1.0]);
 /// assert!((l - 100.0).abs() < 0.01 && a.abs() < 0.01 && b.abs() < 0.01);
 /// ```
 #[must_use]
 pub fn lab(srgb: [f32; 3]) -> [f32; 3] {
-    lab_of_linear(srgb.map(linear))
+    lab_of_lightness(relative_xyz(srgb.map(linear)).map(lightness))
 }
 
-fn linear(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
+/// [`lab`] of every pixel of an image of sRGB-encoded values / 255, axes (y, x).
+///
+/// # Accuracy
+///
+/// Both power laws are tabulated: L\*, a\* and b\* differ from those of [`lab`] by less than 0.005.
+///
+/// # Examples
+///
+/// ```
+/// let black = ndarray::Array2::from_elem((1, 2), [0.0; 3]);
+/// assert!(stereology_imaging::lab_image(black.view())[[0, 0]][0].abs() < 1e-4);
+/// ```
+#[must_use]
+pub fn lab_image(srgb: ArrayView2<'_, [f32; 3]>) -> Array2<[f32; 3]> {
+    let (decode, lightness) = (Table::new(linear, 4096), Table::new(lightness, 16_384));
+    let mut out = srgb.to_owned();
+    out.axis_iter_mut(Axis(0)).into_par_iter().for_each(|mut row| {
+        for p in &mut row {
+            *p = lab_of_lightness(relative_xyz(p.map(|v| decode.at(v))).map(|t| lightness.at(t)));
+        }
+    });
+    out
 }
 
-fn lab_of_linear(rgb: [f32; 3]) -> [f32; 3] {
-    lab_of_lightness(relative_xyz(rgb).map(lightness))
-}
-
-/// X, Y, Z over those of white.
+/// X, Y, Z of linear light over those of white.
 fn relative_xyz([r, g, b]: [f32; 3]) -> [f32; 3] {
     [
         (0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / WHITE[0],
@@ -51,6 +64,7 @@ fn relative_xyz([r, g, b]: [f32; 3]) -> [f32; 3] {
     ]
 }
 
+/// f(t) of the formula.
 fn lightness(t: f32) -> f32 {
     if t > 216.0 / 24389.0 {
         t.cbrt()
@@ -73,6 +87,7 @@ impl Table {
 
     /// Linear between the table's points.
     #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "between 0 and the number of cells")]
     fn at(&self, v: f32) -> f32 {
         let cells = self.0.len() - 1;
         let at = v.clamp(0.0, 1.0) * cells as f32;
@@ -81,55 +96,18 @@ impl Table {
     }
 }
 
-/// Values of every pixel / 255, axes (y, x).
-///
-/// # Examples
-///
-/// ```
-/// let photo = image::RgbImage::from_pixel(2, 1, image::Rgb([0, 51, 255]));
-/// assert_eq!(stereology_segment::encoded_image(&photo)[[0, 1]], [0.0, 0.2, 1.0]);
-/// ```
-#[must_use]
-pub fn encoded_image(photo: &RgbImage) -> Array2<[f32; 3]> {
-    let (width, height) = (photo.width() as usize, photo.height() as usize);
-    let mut pixels = photo.pixels();
-    Array2::from_shape_simple_fn((height, width), || {
-        pixels.next().map_or([0.0; 3], |p| p.0.map(|v| f32::from(v) / 255.0))
-    })
-}
-
-/// [`lab`] of every pixel of a picture of encoded values / 255, axes (y, x).
-///
-/// # Examples
-///
-/// ```
-/// let black = ndarray::Array2::from_elem((1, 2), [0.0; 3]);
-/// assert!(stereology_segment::lab_image(&black)[[0, 0]][0].abs() < 1e-4);
-/// ```
-#[must_use]
-pub fn lab_image(encoded: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
-    // Tables of both power laws: L*, a*, b* are off by less than 0.005.
-    let (decode, lightness) = (Table::new(linear, 4096), Table::new(lightness, 16_384));
-    let mut out = encoded.clone();
-    out.axis_iter_mut(Axis(0)).into_par_iter().for_each(|mut row| {
-        for p in &mut row {
-            *p = lab_of_lightness(relative_xyz(p.map(|v| decode.at(v))).map(|t| lightness.at(t)));
-        }
-    });
-    out
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{lab, lab_image};
+    use ndarray::Array2;
 
-    /// Tables differ from the formula by less than the eye sees by far.
+    /// The tables differ from the formula by less than the eye can see.
     #[test]
-    fn tabulated() {
+    fn tables_agree_with_the_formula() {
         let colours = Array2::from_shape_fn((64, 64), |(y, x)| {
             [x as f32 / 63.0, y as f32 / 63.0, ((x * 5 + y * 3) % 64) as f32 / 63.0]
         });
-        for (found, encoded) in lab_image(&colours).iter().zip(&colours) {
+        for (found, encoded) in lab_image(colours.view()).iter().zip(&colours) {
             for (f, wanted) in found.iter().zip(lab(*encoded)) {
                 assert!((f - wanted).abs() < 0.005, "{encoded:?}: {f} {wanted}");
             }

@@ -1,27 +1,15 @@
-//! `cargo xtask`: the work on the workspace that is not the program itself.
+//! `cargo xtask`: checks of the workspace, and the way to its studies.
 
-mod acceptance;
-mod bench_report;
-mod exemplar_solids;
-mod figures;
-mod grown_stones;
-mod label_scores;
-mod laminar_study;
-mod particle_noise;
-mod relief_table;
-mod renderer_check;
-mod sample;
-mod sand;
-mod texture_table;
 mod tidy;
 
-use std::path::{Path, PathBuf};
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 
-/// Checks, figures, the built-in sample and acceptance of the workspace.
+/// Checks of the workspace, and its studies.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask")]
 struct Program {
@@ -33,118 +21,68 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
-    /// Runs the released program on photographs outside the project and writes docs/acceptance.md, and synthesises textures
-    /// outside the project and writes the table of docs/texture.md; likewise reliefs and docs/microgeometry.md
-    Acceptance {
-        /// Folder that holds images/, textures/, meshes/ and exemplars/
-        #[arg(long)]
-        data: PathBuf,
-        /// Where the solids go
-        #[arg(long, default_value = "target/acceptance")]
-        results: PathBuf,
-        /// Only this part: photographs, textures, noise, reliefs, renderer, grow, measure, solids or laminar
-        #[arg(long)]
-        only: Option<String>,
-        /// Python that has mitsuba, against which the renderer is held; without it that part is left out
-        #[arg(long)]
-        python: Option<PathBuf>,
-    },
-    /// Prints the part of docs/acceptance.md about the CT volume of sand
-    Sand {
-        /// Folder that holds volumes/
-        #[arg(long)]
-        data: PathBuf,
-    },
-    /// Draws the paper's figures into docs/figures
-    Figures {
-        /// Only those whose name holds this
-        only: Option<String>,
-    },
-    /// Times our tasks beside other programs' and writes docs/bench-report.md; run it in release
-    BenchReport {
-        /// Python in which the peers are installed (trimesh with scipy, shapely, networkx, rtree; spheropack; pyrtools); without it our times stand alone
-        #[arg(long)]
-        python: Option<PathBuf>,
-        /// Only the section of this title
-        #[arg(long)]
-        only: Option<String>,
-    },
-    /// Makes the built-in sample and its truth anew
-    Sample,
     /// Runs all that has to pass before a change lands
     Ci,
+    /// Runs the released program on data outside the project and writes the results into the pages under docs/
+    Acceptance(Forwarded),
+    /// Prints the part of docs/acceptance.md about the CT volume of sand
+    Sand(Forwarded),
+    /// Draws the papers' figures into docs/figures
+    Figures(Forwarded),
+    /// Times our tasks beside other programs and writes docs/bench-report.md
+    BenchReport(Forwarded),
+    /// Writes the built-in sample and its true values
+    Sample(Forwarded),
+}
+
+/// Arguments of a task of the crate studies/, which parses them.
+#[derive(Args, Debug)]
+#[command(disable_help_flag = true)]
+struct Forwarded {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
 }
 
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
-        Task::Acceptance {
-            data,
-            results,
-            only,
-            python,
-        } => {
-            let wanted = |part: &str| only.as_deref().is_none_or(|only| only == part);
-            let program = root()?.join("target/release/stereology");
-            if wanted("photographs") {
-                acceptance::run(&program, &data, &results, &root()?.join("docs/acceptance.md"))?;
-            }
-            let page = root()?.join("docs/texture.md");
-            if wanted("textures") {
-                texture_table::run(&data.join("textures"), &results.join("textures"), &page)?;
-            }
-            if wanted("noise") {
-                particle_noise::run(&data.join("images"), &page)?;
-            }
-            if wanted("grow") {
-                grown_stones::grow(&program, &data, &results, &root()?.join("docs/grow.md"))?;
-            }
-            if wanted("measure") {
-                grown_stones::measure(&program, &data, &results, &root()?.join("docs/measure.md"))?;
-            }
-            let page = root()?.join("docs/exemplar.md");
-            if wanted("solids") {
-                exemplar_solids::solids(&program, &data, &results, &page)?;
-            }
-            if wanted("laminar") {
-                exemplar_solids::laminar(&data, &page)?;
-            }
-            if wanted("reliefs") {
-                let page = root()?.join("docs/microgeometry.md");
-                relief_table::run(&program, &data, &results.join("reliefs"), &page)?;
-            }
-            if let Some(python) = python.filter(|_| wanted("renderer")) {
-                renderer_check::run(&python, &results.join("renderer"))?;
-            }
-            Ok(())
-        }
-        Task::Sand { data } => {
-            println!("{}", sand::compare(&data)?);
-            Ok(())
-        }
-        Task::Figures { only } => figures::run(&root()?.join("docs/figures"), only.as_deref()),
-        Task::BenchReport { python, only } => bench_report::run(
-            &root()?.join("docs/bench-report.md"),
-            python.as_deref(),
-            only.as_deref(),
-        ),
-        Task::Sample => sample::run(&root()?.join("stereology/assets")),
         Task::Ci => ci(),
+        Task::Acceptance(forwarded) => study("acceptance", &forwarded),
+        Task::Sand(forwarded) => study("sand", &forwarded),
+        Task::Figures(forwarded) => study("figures", &forwarded),
+        Task::BenchReport(forwarded) => study("bench-report", &forwarded),
+        Task::Sample(forwarded) => study("sample", &forwarded),
     }
 }
 
-fn root() -> Result<&'static Path> {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .context("xtask stands inside the workspace")
-}
-
 fn ci() -> Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .context("xtask stands inside the workspace")?;
     let status = Command::new("bash")
         .arg(".ci/run")
-        .current_dir(root()?)
+        .current_dir(root)
         .status()
         .context("bash cannot be run")?;
     ensure!(status.success(), ".ci/run failed");
+    Ok(())
+}
+
+/// Runs a task of the crate studies/ in release mode.
+fn study(task: &str, forwarded: &Forwarded) -> Result<()> {
+    let status = Command::new("cargo")
+        .args([
+            "run",
+            "--release",
+            "--quiet",
+            "--package",
+            "stereology-studies",
+            "--",
+            task,
+        ])
+        .args(&forwarded.arguments)
+        .status()
+        .context("cargo cannot be run")?;
+    ensure!(status.success(), "{task} failed");
     Ok(())
 }

@@ -17,9 +17,15 @@ const FLOOR: [&str; 5] = [
     "stereology-metrics",
 ];
 /// Crates that may know several rooms.
-const ROOF: [&str; 3] = ["stereology", "stereology-cli", "xtask"];
+const ROOF: [&str; 5] = [
+    "stereology",
+    "stereology-report",
+    "stereology-cli",
+    "stereology-studies",
+    "xtask",
+];
 /// Folders that are programs (fuzz stands outside the workspace): they may print and look at the clock.
-const PROGRAMS: [&str; 3] = ["cli", "xtask", "fuzz"];
+const PROGRAMS: [&str; 4] = ["cli", "studies", "xtask", "fuzz"];
 /// Names that say nothing of what a module is about.
 const EMPTY_NAMES: [&str; 7] = ["util", "utils", "common", "helper", "helpers", "types", "misc"];
 /// Packages that end in -sys and hold Rust only.

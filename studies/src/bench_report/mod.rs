@@ -4,17 +4,17 @@
 //! Python script of our own next to it, run by the interpreter that `--python` names; where the peer is not installed, the section says so and has
 //! our times alone.
 
+mod bench;
 mod packing;
 mod section_law;
 mod solids;
 mod textures;
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use rayon::ThreadPool;
-use serde_json::Value;
+
+use bench::{Bench, Section};
 
 /// Measures the tasks of a section.
 type Measure = fn(&Bench) -> Result<Section>;
@@ -27,94 +27,21 @@ const SECTIONS: [(&str, Measure); 4] = [
     ("Solids", solids::measure),
 ];
 
-/// Our tasks against one peer's.
-struct Section {
-    /// What was done by whom, what is counted and what is not.
-    words: String,
-    /// Name and version of the peer, or why there is none.
-    peer: Result<String, String>,
-    rows: Vec<Row>,
-}
-
-/// One task; CPU seconds of one core.
-struct Row {
-    task: String,
-    ours: f64,
-    peer: Option<f64>,
-    /// Whether both came to the same answer.
-    remark: String,
-}
-
-/// Where times are taken.
-struct Bench {
-    python: Option<PathBuf>,
-    /// One thread, so that its processor time is all of it.
-    one_core: ThreadPool,
-}
-
-impl Bench {
-    /// CPU seconds of one run: of three batches of so many runs the shortest, for the system counts in steps of milliseconds. And what the
-    /// last run answered.
-    fn time<T: Send>(&self, batch: u32, task: impl Fn() -> Result<T> + Sync) -> Result<(f64, T)> {
-        self.one_core.install(|| {
-            let mut best = f64::INFINITY;
-            let mut answer = None;
-            for _ in 0..3 {
-                let start = cpu_seconds()?;
-                for _ in 0..batch.max(1) {
-                    answer = Some(task()?);
-                }
-                best = best.min((cpu_seconds()? - start) / f64::from(batch.max(1)));
-            }
-            Ok((best, answer.context("at least one run")?))
-        })
-    }
-
-    /// What a script of ours prints, a JSON object with `version`; or why the peer cannot be asked.
-    fn ask_peer(&self, name: &str, script: &str, arguments: &[String]) -> Result<Result<Value, String>> {
-        let Some(python) = &self.python else {
-            return Ok(Err("not measured: no --python was given".to_owned()));
-        };
-        let output = Command::new(python)
-            .args(["-c", script])
-            .args(arguments)
-            .env("OPENBLAS_NUM_THREADS", "1")
-            .env("OMP_NUM_THREADS", "1")
-            .output()
-            .with_context(|| format!("{} cannot be run", python.display()))?;
-        ensure!(
-            output.status.success(),
-            "the peer's script failed: {}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let answer: Value = serde_json::from_slice(&output.stdout).context("the peer's script printed no JSON")?;
-        Ok(match answer.get("missing").and_then(Value::as_str) {
-            Some(missing) => Err(format!("not measured: {name} is not whole in that Python ({missing})")),
-            None => Ok(answer),
-        })
-    }
-}
-
-/// Processor time of this thread.
-fn cpu_seconds() -> Result<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat")
-        .context("processor times are read from /proc/thread-self/schedstat, which only Linux has")?;
-    let nanoseconds: f64 = text.split_whitespace().next().context("an empty schedstat")?.parse()?;
-    Ok(1e-9 * nanoseconds)
-}
-
 /// Times everything and writes the report; or the section of one title only, in place of the one that the report has.
 pub fn run(document: &Path, python: Option<&Path>, only: Option<&str>) -> Result<()> {
-    let bench = Bench {
-        python: python.map(Path::to_owned),
-        one_core: rayon::ThreadPoolBuilder::new().num_threads(1).build()?,
-    };
+    let titles = SECTIONS.map(|(title, _)| title);
+    ensure!(
+        only.is_none_or(|only| titles.iter().any(|title| title.eq_ignore_ascii_case(only))),
+        "no section has this title; the sections are {}",
+        titles.join(", ")
+    );
+    let bench = Bench::new(python)?;
     let old = match only {
         Some(_) => std::fs::read_to_string(document).with_context(|| document.display().to_string())?,
         None => String::new(),
     };
     let mut text = format!(
-        "# Times beside other programs\n\nWritten by `cargo run --release -p xtask -- bench-report --python PYTHON`. CPU seconds of one core, the \
+        "# Times beside other programs\n\nWritten by `cargo xtask bench-report --python PYTHON`. CPU seconds of one core, the \
          fewest of several runs, each section in one run on {}; ratios carry over to other machines better than seconds.\n",
         processor()
     );
@@ -184,7 +111,8 @@ fn significant(x: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Row, Section, markdown, section_of, significant};
+    use super::bench::{Row, Section};
+    use super::{markdown, section_of, significant};
 
     #[test]
     fn numbers_have_two_digits() {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use stereology::kmatrix::{SectionLaw, SectionOptions};
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, write_mesh};
 
-use super::{Bench, Row, Section};
+use super::bench::{Bench, Row, Section};
 
 const SCRIPT: &str = include_str!("section_law.py");
 const BINS: usize = 10;

@@ -15,7 +15,7 @@ use stereology::grid::Format;
 use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology::volume::{Channel, Residual, Solid};
 
-use super::{Bench, Row, Section};
+use super::bench::{Bench, Row, Section};
 
 const SIDE: f64 = 128.0;
 const POINTS: usize = 1_000_000;
@@ -37,7 +37,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
             remark: format!("{:.1} million a second on one core", 1e-6 * POINTS as f64 / ours),
         });
     }
-    let folder = crate::root()?.join("target/bench-report");
+    let folder = crate::workspace::root()?.join("target/bench-report");
     fs::create_dir_all(&folder)?;
     let written = files(&folder);
     fs::remove_dir_all(&folder)?;

@@ -9,7 +9,7 @@ use stereology::pyramid::{
 };
 use stereology::spectrum::{Complex, RealFft};
 
-use super::{Bench, Row, Section};
+use super::bench::{Bench, Row, Section};
 
 const SCRIPT: &str = include_str!("textures.py");
 const SIDES: [usize; 2] = [512, 1024];

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use stereology::anneal::{Grain, PackOptions, Packing, box_for_fraction, lognormal_sizes, mix, pack, populate};
 use stereology::shape::{Arrangement, Body, ClosedMesh, TriangleMesh, UnitBody};
 
-use super::{Bench, Row, Section};
+use super::bench::{Bench, Row, Section};
 
 const SCRIPT: &str = include_str!("packing.py");
 const SIGMA: f64 = 0.3;

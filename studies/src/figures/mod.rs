@@ -23,11 +23,10 @@ pub mod textures;
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
-/// Draws all figures, or those whose name holds `only`, into `folder`.
+/// Draws all figures, or those whose name contains `only`, into `folder`.
 pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
-    std::fs::create_dir_all(folder)?;
     type Figure = fn(&Path) -> Result<()>;
     let figures: [(&str, Figure); 24] = [
         ("figure-02-sphere-matrix", particles::draw_matrix),
@@ -55,6 +54,12 @@ pub fn run(folder: &Path, only: Option<&str>) -> Result<()> {
         ("microgeometry", reliefs::draw),
         ("readme", solids::draw_readme),
     ];
+    ensure!(
+        only.is_none_or(|only| figures.iter().any(|(name, _)| name.contains(only))),
+        "no figure has such a name; the figures are {}",
+        figures.map(|(name, _)| name).join(", ")
+    );
+    std::fs::create_dir_all(folder)?;
     for (name, draw) in figures {
         if only.is_none_or(|only| name.contains(only)) {
             println!("{name}");

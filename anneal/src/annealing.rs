@@ -88,7 +88,7 @@ impl Chain<'_, '_> {
     /// Tries every particle once; returns the energy.
     fn sweep(&mut self, temperature: f64, rng: &mut ChaCha8Rng) -> f64 {
         let count = self.bodies.assembly.len();
-        let (mut tried, mut taken) = (0, 0);
+        let (mut tried, mut taken) = (0_usize, 0_usize);
         let mut energy = 0.0;
         for i in 0..count {
             let before = self.bodies.energy(i);
@@ -107,7 +107,7 @@ impl Chain<'_, '_> {
             energy += 0.5 * after.unwrap_or(before);
         }
         self.per_particle = 2.0 * energy / count.max(1) as f64;
-        let acceptance = f64::from(taken as u32) / f64::from(tried.max(1) as u32);
+        let acceptance = taken as f64 / tried.max(1) as f64;
         let factor = if acceptance > 0.4 {
             1.15
         } else if acceptance < 0.3 {

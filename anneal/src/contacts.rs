@@ -12,6 +12,7 @@
 //! iterations against eighty.) Where bodies stand for themselves by convex parts, pairs are pairs of parts. Unit of energy: length².
 
 use crate::assembly::Assembly;
+use crate::conversions::compact;
 use crate::gauge::{Gauge, Search};
 use crate::neighbours::{Neighbour, Neighbours};
 use nalgebra::Vector3;
@@ -55,8 +56,8 @@ impl Block {
             arbitrary(a, b)
         };
         self.pushes.push(Push {
-            a: a as u32,
-            b: b as u32,
+            a: compact(a),
+            b: compact(b),
             force: normal * depth,
             on_a: arms[0] + gauge.on_a * gauge.value.max(0.0),
             on_b: arms[1] + gauge.on_b * gauge.value.max(0.0),
@@ -224,7 +225,7 @@ impl Assembly<'_> {
                 block.energy += 0.5 * depth * depth;
                 block.worst = block.worst.max(1.0 - distance / touching);
                 block.pushes.push(Push {
-                    a: a as u32,
+                    a: compact(a),
                     b: other,
                     force,
                     on_a: Vector3::zeros(),

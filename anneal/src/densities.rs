@@ -1,5 +1,6 @@
 //! From unfolded number densities to particles.
 
+use crate::conversions::truncated;
 use crate::population::{BINS, Grain, MOST, PopulationError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +64,7 @@ pub fn counts_from_densities(number_density: &[f64], volume: f64) -> Result<Vec<
     let (mut expected, mut given) = (0.0, 0);
     for (bin, density) in number_density.iter().enumerate().rev() {
         expected += density * volume;
-        counts[bin] = (expected + 0.5).floor() as usize - given;
+        counts[bin] = truncated(expected + 0.5) - given;
         given += counts[bin];
     }
     Ok(counts)

@@ -46,15 +46,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "particles are fewer than 2^32 (checked), cells fewer than 2^40, and floors of bounded floats are meant"
-)]
-
 mod annealing;
 mod assembly;
 mod certificate;
 mod contacts;
+mod conversions;
 mod convex_parts;
 mod damped;
 mod densities;
@@ -69,6 +65,7 @@ mod options;
 mod order;
 mod pack;
 mod paper;
+mod periodic_cells;
 mod population;
 mod proxies;
 mod radial;

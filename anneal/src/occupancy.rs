@@ -1,10 +1,13 @@
-//! Who is near a point while particles come, go and move one at a time: the hierarchical grid of [`neighbours`](crate::neighbours), kept up to date.
+//! Bodies near a point while bodies are inserted and moved one at a time: the hierarchical grid of [`neighbours`](crate::neighbours), updated after
+//! each move.
 
+use crate::conversions::compact;
 use crate::neighbours::levels;
+use crate::periodic_cells::PeriodicCells;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
-/// Bodies in cells, those of about the same reach on a level of their own.
+/// Bodies in cells, with a level of cells for bodies of similar reach.
 pub(crate) struct Occupancy {
     sides: Vector3<f64>,
     levels: Vec<Level>,
@@ -14,7 +17,7 @@ pub(crate) struct Occupancy {
 
 struct Level {
     longest_reach: f64,
-    cells: [i64; 3],
+    cells: PeriodicCells,
     members: Vec<Vec<u32>>,
 }
 
@@ -29,21 +32,15 @@ impl Occupancy {
             longest[level as usize] = longest[level as usize].max(reach);
             bodies[level as usize] += 1;
         }
-        let mean_side = sides.product().cbrt();
         let levels = longest
             .into_iter()
             .zip(bodies)
             .map(|(longest_reach, bodies)| {
-                let most = ((2 * bodies + 8) as f64).cbrt();
-                let cells: [i64; 3] = std::array::from_fn(|axis| {
-                    let fit = (sides[axis] / (2.0 * longest_reach).max(f64::MIN_POSITIVE))
-                        .min(most * sides[axis] / mean_side);
-                    (fit.floor() as i64).clamp(1, 1024)
-                });
+                let cells = PeriodicCells::new(sides, 2.0 * longest_reach, 2 * bodies + 8, 1024);
                 Level {
                     longest_reach,
+                    members: vec![Vec::new(); cells.len()],
                     cells,
-                    members: vec![Vec::new(); (cells[0] * cells[1] * cells[2]) as usize],
                 }
             })
             .collect();
@@ -55,14 +52,10 @@ impl Occupancy {
         }
     }
 
-    /// Puts a body where it is; its centre is in the box.
+    /// Records the position of a body; `centre` is in the box.
     pub(crate) fn place(&mut self, body: usize, centre: &Vector3<f64>) {
         let level = &mut self.levels[self.level_of[body] as usize];
-        let at: [i64; 3] = std::array::from_fn(|axis| {
-            let cell = (centre[axis] * (level.cells[axis] as f64 / self.sides[axis])).floor() as i64;
-            cell.clamp(0, level.cells[axis] - 1)
-        });
-        let cell = ((at[0] * level.cells[1] + at[1]) * level.cells[2] + at[2]) as u32;
+        let cell = compact(level.cells.of(centre));
         if self.cell_of[body] == cell {
             return;
         }
@@ -71,13 +64,13 @@ impl Occupancy {
         {
             members.swap_remove(place);
         }
-        level.members[cell as usize].push(body as u32);
+        level.members[cell as usize].push(compact(body));
         self.cell_of[body] = cell;
     }
 
-    /// Visits every body (and every image of it, the asking body's own too) in the cells within `reach` of a point of the box, with the displacement of its image.
+    /// Visits every body in the cells within `reach` of a point of the box, with the displacement of its image.
     ///
-    /// Each image is met once, however few cells there are along an axis.
+    /// All images are visited, those of a body at the point itself included, and each once, however few cells an axis has.
     pub(crate) fn visit<B>(
         &self,
         centre: &Vector3<f64>,
@@ -86,24 +79,13 @@ impl Occupancy {
     ) -> ControlFlow<B> {
         for level in &self.levels {
             let far = (reach + level.longest_reach) * (1.0 + 1e-9);
-            let range = |axis: usize| {
-                let scale = level.cells[axis] as f64 / self.sides[axis];
-                ((centre[axis] - far) * scale).floor() as i64..=((centre[axis] + far) * scale).floor() as i64
-            };
-            let [nx, ny, nz] = level.cells;
-            for kx in range(0) {
-                let (cx, px) = (kx.rem_euclid(nx), kx.div_euclid(nx));
-                for ky in range(1) {
-                    let (cy, py) = (ky.rem_euclid(ny), ky.div_euclid(ny));
-                    for kz in range(2) {
-                        let (cz, pz) = (kz.rem_euclid(nz), kz.div_euclid(nz));
-                        let shift = Vector3::new(px as f64, py as f64, pz as f64).component_mul(&self.sides);
-                        for &body in &level.members[((cx * ny + cy) * nz + cz) as usize] {
-                            visitor(body as usize, &shift)?;
-                        }
-                    }
+            level.cells.visit(centre, far, |cell, period| {
+                let shift = Vector3::from(period.map(|p| p as f64)).component_mul(&self.sides);
+                for &body in &level.members[cell] {
+                    visitor(body as usize, &shift)?;
                 }
-            }
+                ControlFlow::Continue(())
+            })?;
         }
         ControlFlow::Continue(())
     }

@@ -1,6 +1,7 @@
 //! Particles moved one at a time: what a particle overlaps where it is.
 
 use crate::assembly::Assembly;
+use crate::conversions::floor;
 use crate::occupancy::Occupancy;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt};
@@ -94,7 +95,7 @@ impl<'a, 'b> OneByOne<'a, 'b> {
         if longest <= sides.min() {
             return ControlFlow::Continue(());
         }
-        let most = sides.map(|side| (longest / side).floor() as i64);
+        let most = sides.map(|side| floor(longest / side));
         for x in -most.x..=most.x {
             for y in -most.y..=most.y {
                 for z in -most.z..=most.z {

@@ -1,5 +1,6 @@
 //! Which particles are to be packed: their sizes, shapes and categories, and the box they fill.
 
+use crate::conversions::truncated;
 use nalgebra::{Point3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -132,7 +133,7 @@ pub fn mix(sizes: &[f64], shares: &[f64], seed: u64) -> Result<Vec<Grain>, Popul
         });
     }
     let wanted: Vec<f64> = shares.iter().map(|share| share / whole * sizes.len() as f64).collect();
-    let mut counts: Vec<usize> = wanted.iter().map(|w| w.floor() as usize).collect();
+    let mut counts: Vec<usize> = wanted.iter().map(|&w| truncated(w)).collect();
     let mut by_remainder: Vec<usize> = (0..shares.len()).collect();
     by_remainder.sort_by(|&p, &q| wanted[q].fract().total_cmp(&wanted[p].fract()).then(p.cmp(&q)));
     let missing = sizes.len().saturating_sub(counts.iter().sum());
@@ -266,7 +267,7 @@ pub fn count_to_fill(
     if count > MOST {
         Err(PopulationError::TooMany(count))
     } else {
-        Ok(count as usize)
+        Ok(truncated(count))
     }
 }
 

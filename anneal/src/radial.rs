@@ -1,5 +1,6 @@
 //! How often particles are found at each distance from one another.
 
+use crate::conversions::truncated;
 use crate::neighbours::Neighbours;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -91,7 +92,7 @@ pub fn radial_distribution(
                 for neighbour in neighbours.of(i).1 {
                     let j = neighbour.other as usize;
                     let offset = centres[j] + neighbours.images.shift(neighbour.image) - centres[i];
-                    let bin = (offset.norm() / (half[i] + half[j]) / reach * bins as f64) as usize;
+                    let bin = truncated(offset.norm() / (half[i] + half[j]) / reach * bins as f64);
                     // A particle is no neighbour of its own images.
                     if i != j && bin < bins {
                         found[bin] += 1;

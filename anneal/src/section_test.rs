@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody, isotropic_rotation};
 
 use crate::certificate::Packing;
+use crate::conversions::{floor, truncated};
 use crate::one_by_one::anywhere;
 
 /// What random planes through a packing show.
@@ -125,13 +126,13 @@ fn count(
             let body = &bodies[particle.shape];
             let normal = particle.orientation.inverse() * world;
             let reach = body.bounding_radius() * particle.size;
-            let from = ((particle.position[axis] - reach - first) / apart).ceil() as i64;
-            let to = ((particle.position[axis] + reach - first) / apart).floor() as i64;
+            let from = -floor(-(particle.position[axis] - reach - first) / apart);
+            let to = floor((particle.position[axis] + reach - first) / apart);
             for plane in from..=to {
                 let height = first + plane as f64 * apart - particle.position[axis];
                 for area in body.profile_areas(&normal, height / particle.size) {
                     let size = (4.0 * area / std::f64::consts::PI).sqrt() * particle.size;
-                    counts[((size / largest * BINS as f64) as usize).min(BINS - 1)] += 1.0;
+                    counts[truncated(size / largest * BINS as f64).min(BINS - 1)] += 1.0;
                 }
             }
         }

@@ -8,6 +8,7 @@
 //! Surfaces that touch, within rounding, may hide an overlap without any crossing (two L that share a plane): then every face is asked at four points a hair
 //! below it.
 
+use crate::conversions::compact;
 use crate::difference::{Posed, Solid};
 use crate::gauge::{Gauge, Search};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -48,7 +49,7 @@ impl Surface {
             .iter()
             .map(|t| t.map(|v| mesh.vertices[v as usize].coords))
             .collect();
-        let mut piece: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+        let mut piece: Vec<u32> = (0..compact(mesh.vertices.len())).collect();
         for &[a, b, c] in &mesh.triangles {
             let root = first(&mut piece, a);
             for v in [b, c] {

@@ -17,7 +17,7 @@ use crate::PyramidError;
 use crate::bank::most_levels;
 use crate::filters::{Directions, band_response};
 use crate::matching::whole_and_part;
-use crate::reweight::Change;
+use crate::wave_change::Change;
 
 /// Steps of the tables of responses, up to the corner of the cube.
 pub(crate) const STEPS: usize = 1 << 12;

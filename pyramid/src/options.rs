@@ -1,5 +1,9 @@
 //! What a synthesis is given and what it says about itself.
 
+use std::ops::ControlFlow;
+
+use stereology_metrics::Finding;
+
 /// How a volume is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
@@ -253,15 +257,8 @@ pub enum TextureError {
     Cancelled,
 }
 
-/// Something the user of a texture should know.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Finding {
-    /// Fixed word: `levels-reduced`, `few-samples`, `constant-exemplar`.
-    pub code: &'static str,
-    /// What was found, in a sentence.
-    pub message: String,
-}
+/// Callback of a synthesis: receives the completed fraction, from 0 to 1, and the report so far; returns `Break` to cancel.
+pub type Watch<'a> = &'a (dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync);
 
 /// What a synthesis did.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -278,7 +275,7 @@ pub struct TextureReport {
     pub slice_errors: Vec<f64>,
     /// The same of the finished volume; zero for images.
     pub final_error: f64,
-    /// What the user should know.
+    /// Findings with the codes `levels-reduced`, `few-samples` and `constant-exemplar`.
     pub findings: Vec<Finding>,
 }
 

@@ -1,22 +1,18 @@
 //! What is settled before a synthesis starts: levels, memory, and the noise it starts from.
 
-use std::ops::ControlFlow;
-
 use ndarray::{Array, Dimension, IntoDimension};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
+use stereology_metrics::Finding;
 
 use crate::bank::{level_shape, most_levels};
 use crate::exemplar::Prepared;
-use crate::{Exemplar, Finding, Matching, Mode, TextureError, TextureOptions, TextureReport};
+use crate::{Exemplar, Matching, Mode, TextureError, TextureOptions, TextureReport};
 
 /// Samples along the shortest side of the coarsest oriented bands that the default number of levels leaves.
 const COARSEST: usize = 16;
-
-/// Is told the part done and the report so far, and says whether to go on.
-pub(crate) type Watch<'a> = &'a (dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync);
 
 pub(crate) struct Plan {
     pub(crate) levels: usize,
@@ -71,17 +67,13 @@ impl Plan {
         let mut findings = Vec::new();
         if let Some(asked) = self.asked.filter(|&asked| asked > self.levels) {
             let message = format!("{asked} levels are too many for these sizes: {} were used", self.levels);
-            findings.push(Finding {
-                code: "levels-reduced",
-                message,
-            });
+            findings.push(Finding::new("levels-reduced", message));
         }
         if !exemplar.varies(0) {
-            let message = "the exemplar is one colour: so is the texture".to_owned();
-            findings.push(Finding {
-                code: "constant-exemplar",
-                message,
-            });
+            findings.push(Finding::new(
+                "constant-exemplar",
+                "the exemplar is one colour: so is the texture",
+            ));
         }
         TextureReport {
             levels: self.levels,

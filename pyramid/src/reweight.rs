@@ -9,14 +9,13 @@
 //! ```
 //!
 //! λ is found by Newton's method: the gradient is wanted − found, the Hessian Σ_k P G_b²(κ_n) G_c²(κ_m). The Hessian hardly
-//! changes with P, so it is summed up once for three steps, over one row of waves in [`ROWS_ASKED`] and all of the coarsest.
+//! changes with P, so it is summed up once for three steps, over one row of waves in four and all of the coarsest (see `wave_change`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
-use stereology_spectrum::{Complex, frequency};
 
 use crate::cuts::{Cuts, STEPS, thirteen_normals};
-use crate::matching::whole_and_part;
+use crate::wave_change::Change;
 
 /// Newton's steps at most.
 const MOST_STEPS: usize = 9;
@@ -24,85 +23,8 @@ const MOST_STEPS: usize = 9;
 const STEPS_OF_HESSIAN: usize = 3;
 /// Largest ln(variance / wanted) that is let be.
 const NEAR_ENOUGH: f64 = 1e-3;
-/// Rows of waves of which one is asked how the bands hang together.
-const ROWS_ASKED: usize = 4;
-/// Rows below this frequency are all asked.
-const COARSE: f64 = 0.06;
 /// Part of the Hessian's diagonal added to it, for bands that say the same.
 const DAMPING: f64 = 1e-5;
-/// No step multiplies an amplitude by more than the exponential of this.
-const MOST: f32 = 1.0;
-
-/// A change of waves, and what is asked about them.
-pub(crate) struct Change<'a> {
-    /// Logarithm of the factor of amplitudes over the radius, by normal; none before the first step.
-    logs: Vec<Vec<f32>>,
-    /// Squared responses, the bands of a step of the radius side by side; empty if nothing is asked.
-    responses: &'a [f32],
-    bands: usize,
-}
-
-impl Change<'_> {
-    /// Multiplies a row of waves.
-    pub(crate) fn apply(&self, bins: &mut [Complex<f32>], positions: &[Vec<f32>]) {
-        if self.logs.is_empty() {
-            return;
-        }
-        let mut sums = vec![0.0_f32; bins.len()];
-        for (table, positions) in self.logs.iter().zip(positions) {
-            for (sum, &position) in sums.iter_mut().zip(positions) {
-                // Near enough, since what it gives is measured.
-                *sum += table[whole_and_part(position).0 as usize];
-            }
-        }
-        for (bin, sum) in bins.iter_mut().zip(&sums) {
-            *bin *= sum.clamp(-MOST, MOST).exp();
-        }
-    }
-
-    /// Adds P G_b² G_c² of a row of waves for all pairs of bands of all normals, if the row is one of those asked.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "places in a table"
-    )]
-    pub(crate) fn add_products(
-        &self,
-        size: [usize; 3],
-        row: usize,
-        positions: &[Vec<f32>],
-        power: &[f64],
-        products: &mut Vec<f64>,
-    ) {
-        if self.responses.is_empty() {
-            return;
-        }
-        let unknowns = positions.len() * self.bands;
-        products.resize(unknowns * unknowns, 0.0);
-        let (y, z) = (row % size[1], row / size[1]);
-        let coarse = frequency(z, size[0]).hypot(frequency(y, size[1])) < COARSE;
-        if !coarse && !(y + 3 * z).is_multiple_of(ROWS_ASKED) {
-            return;
-        }
-        let weight = if coarse { 1.0 } else { ROWS_ASKED as f64 };
-        // Of each normal only neighbouring bands see a wave.
-        let mut seen: Vec<(usize, f64)> = Vec::with_capacity(unknowns);
-        for (x, power) in power.iter().enumerate() {
-            seen.clear();
-            for (n, positions) in positions.iter().enumerate() {
-                let responses = &self.responses[positions[x] as usize * self.bands..][..self.bands];
-                let of_normal = responses.iter().enumerate().filter(|(_, response)| **response > 0.0);
-                seen.extend(of_normal.map(|(b, &response)| (n * self.bands + b, f64::from(response))));
-            }
-            for (i, &(row, a)) in seen.iter().enumerate() {
-                let (a, products) = (weight * power * a, &mut products[row * unknowns..][..unknowns]);
-                for &(column, b) in &seen[..=i] {
-                    products[column] += a * b;
-                }
-            }
-        }
-    }
-}
 
 /// How the band variances of one field answer to a change of λ: the factored Hessian, scaled to a diagonal of one.
 pub(crate) struct Curvature {

@@ -9,10 +9,10 @@ use crate::cuts::{Cuts, face_diagonals, space_diagonals};
 use crate::filters::Directions;
 use crate::isotropy::Isotropy;
 use crate::oblique::Oblique;
-use crate::plan::{Watch, root_mean_square};
+use crate::plan::root_mean_square;
 use crate::reweight::Curvature;
 use crate::targets::BandTargets;
-use crate::{Cut, Mode, TextureError, TextureOptions, TextureReport};
+use crate::{Cut, Mode, TextureError, TextureOptions, TextureReport, Watch};
 
 /// How much nearer each slice's band powers are brought to the mean over the slices before matching, as an exponent: 0 lets
 /// some slices of a coarse texture have half of the contrast of others, 1 makes them all alike.

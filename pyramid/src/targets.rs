@@ -2,12 +2,13 @@
 
 use ndarray::Array2;
 use rayon::prelude::*;
+use stereology_metrics::Finding;
 use stereology_spectrum::{Complex, RealFft, frequency};
 
+use crate::Quantiles;
 use crate::bank::FilterBank;
 use crate::exemplar::{FEWEST_PIXELS, View, quantiles};
 use crate::filters::{Directions, band_response};
-use crate::{Finding, Quantiles};
 
 /// Target distributions of the bands of one component.
 pub(crate) struct BandTargets {
@@ -93,10 +94,7 @@ impl Analysis {
                          {:.0} % lie in the mask",
                         100.0 * least
                     );
-                    findings.push(Finding {
-                        code: "few-samples",
-                        message,
-                    });
+                    findings.push(Finding::new("few-samples", message));
                 }
                 Some(counted)
             })

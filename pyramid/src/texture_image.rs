@@ -1,9 +1,8 @@
 //! Heeger-Bergen synthesis of images.
 
-use std::ops::ControlFlow;
-
 use ndarray::Array3;
 use rayon::prelude::*;
+use stereology_metrics::Progress;
 
 use crate::bank::FilterBank;
 use crate::canvas::{Canvas, match_bands};
@@ -11,7 +10,7 @@ use crate::exemplar::{Exemplar, Prepared};
 use crate::filters::Directions;
 use crate::plan::{Plan, root_mean_square, shaped, white_noise};
 use crate::targets::{Analysis, Pooling};
-use crate::{TextureError, TextureOptions, TextureReport};
+use crate::{TextureError, TextureOptions, TextureReport, Watch};
 
 /// An image of any size that looks like the exemplar, and repeats without a seam.
 ///
@@ -49,7 +48,7 @@ pub fn synthesize_image(
     exemplar: &Exemplar<'_>,
     size: [usize; 2],
     options: &TextureOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Array3<f32>, TextureError> {
     synthesize_image_with_report(exemplar, size, options, &|done, _| progress(done)).map(|(image, _)| image)
 }
@@ -79,7 +78,7 @@ pub fn synthesize_image_with_report(
     exemplar: &Exemplar<'_>,
     size: [usize; 2],
     options: &TextureOptions,
-    watch: &(dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync),
+    watch: Watch<'_>,
 ) -> Result<(Array3<f32>, TextureReport), TextureError> {
     let plan = Plan::new(&[*exemplar], &size, options)?;
     let exemplar = Prepared::new(&[*exemplar], options.edges)?;

@@ -1,17 +1,16 @@
 //! Synthesis of volumes whose slices look like an image.
 
-use std::ops::ControlFlow;
-
 use ndarray::Array4;
 use rayon::prelude::*;
+use stereology_metrics::Progress;
 use stereology_spectrum::{RealFft, frequency};
 
 use crate::canvas::Canvas;
 use crate::exemplar::{Exemplar, Prepared, View};
-use crate::plan::{Plan, Watch, shaped, white_noise};
+use crate::plan::{Plan, shaped, white_noise};
 use crate::slice_matching::{Rounds, match_slices, match_volume};
 use crate::targets::{Analysis, BandTargets, Pooling};
-use crate::{Mode, TextureError, TextureOptions, TextureReport, VolumeSpectrum, volume_spectrum};
+use crate::{Mode, TextureError, TextureOptions, TextureReport, VolumeSpectrum, Watch, volume_spectrum};
 
 /// A volume whose slices look like the exemplar at the exemplar's pixel scale, and that repeats without a seam along all
 /// three axes. See [`synthesize_volume_with_report`], of which this is the volume.
@@ -39,7 +38,7 @@ pub fn synthesize_volume(
     exemplar: &Exemplar<'_>,
     size: [usize; 3],
     options: &TextureOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Array4<f32>, TextureError> {
     synthesize_volume_with_report(exemplar, size, options, &|done, _| progress(done)).map(|(volume, _)| volume)
 }
@@ -83,7 +82,7 @@ pub fn synthesize_volume_with_report(
     exemplar: &Exemplar<'_>,
     size: [usize; 3],
     options: &TextureOptions,
-    watch: &(dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync),
+    watch: Watch<'_>,
 ) -> Result<(Array4<f32>, TextureReport), TextureError> {
     synthesize(&[*exemplar], size, options, watch)
 }
@@ -128,7 +127,7 @@ pub fn synthesize_oriented_volume(
     exemplars: &[Exemplar<'_>],
     size: [usize; 3],
     options: &TextureOptions,
-    watch: &(dyn Fn(f64, &TextureReport) -> ControlFlow<()> + Sync),
+    watch: Watch<'_>,
 ) -> Result<(Array4<f32>, TextureReport), TextureError> {
     if exemplars.is_empty() || exemplars.len() > 3 {
         return Err(TextureError::Exemplars { found: exemplars.len() });

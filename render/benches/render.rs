@@ -1,4 +1,4 @@
-//! Seconds a picture.
+//! Time to render an image.
 #![expect(missing_docs, reason = "criterion's macros make undocumented functions")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -7,7 +7,7 @@ use std::time::Duration;
 use stereology_render::{BlockOptions, Camera, RenderOptions, render_block, render_mesh};
 use stereology_shape::TriangleMesh;
 
-fn pictures(c: &mut Criterion) {
+fn images(c: &mut Criterion) {
     let mut group = c.benchmark_group("128² pixels");
     group
         .sample_size(10)
@@ -25,5 +25,5 @@ fn pictures(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, pictures);
+criterion_group!(benches, images);
 criterion_main!(benches);

@@ -1,6 +1,6 @@
-//! A mesh carved from marble.
+//! Renders a mesh carved from marble.
 //!
-//! `cargo run --release -p stereology-render --example carve -- MESH PICTURE.png`; without a mesh, a torus.
+//! `cargo run --release -p stereology-render --example carve -- MESH IMAGE.png`; without a mesh, a torus.
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 
 use nalgebra::Point3;
@@ -8,7 +8,7 @@ use std::time::Instant;
 use stereology_render::{BlockOptions, Camera, RenderOptions, render_block, render_mesh};
 use stereology_shape::{TriangleMesh, read_mesh};
 
-/// Marble: a wave bent by slower ones.
+/// Marble: a wave distorted by waves of lower frequency.
 #[expect(clippy::cast_possible_truncation, reason = "colours are f32")]
 fn marble(p: &Point3<f64>) -> [f32; 3] {
     let mut q = p.coords;
@@ -25,23 +25,23 @@ fn marble(p: &Point3<f64>) -> [f32; 3] {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let start = Instant::now();
-    let picture = match arguments.first().map(String::as_str) {
+    let image = match arguments.first().map(String::as_str) {
         Some("block") => render_block(
             &|p| marble(&(p * 5.0)),
             nalgebra::Vector3::repeat(1.0),
             &BlockOptions::default(),
         )?,
-        Some(file) => picture(&read_mesh(file)?, arguments.get(2))?,
-        None => picture(&TriangleMesh::torus(2.0, 0.8, 64, 32), None)?,
+        Some(file) => rendered(&read_mesh(file)?, arguments.get(2))?,
+        None => rendered(&TriangleMesh::torus(2.0, 0.8, 64, 32), None)?,
     };
-    println!("{:?} in {:.1} s", picture.dimensions(), start.elapsed().as_secs_f64());
+    println!("{:?} in {:.1} s", image.dimensions(), start.elapsed().as_secs_f64());
     if let Some(file) = arguments.get(1) {
-        picture.save(file)?;
+        image.save(file)?;
     }
     Ok(())
 }
 
-fn picture(mesh: &TriangleMesh, azimuth: Option<&String>) -> Result<image::RgbImage, Box<dyn std::error::Error>> {
+fn rendered(mesh: &TriangleMesh, azimuth: Option<&String>) -> Result<image::RgbImage, Box<dyn std::error::Error>> {
     let (low, high) = mesh.bounding_box().ok_or("no vertices")?;
     let scale = 5.0 / (high - low).amax();
     let camera = Camera {

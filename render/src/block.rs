@@ -1,23 +1,23 @@
-//! A block of the solid, three of its faces seen, as the paper shows one (figure 5).
+//! A block of the solid with three visible faces, as in the paper (figure 5).
 
 use crate::camera::Camera;
-use crate::mesh_picture::{RenderError, RenderOptions, render_mesh};
 use crate::paths::Colour;
+use crate::render::{RenderError, RenderOptions, render_mesh};
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
 use stereology_shape::TriangleMesh;
 
-/// How a block is shown.
+/// Options of [`render_block`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockOptions {
-    /// Where it is seen from; z is up.
+    /// Position of the camera; z is up.
     pub camera: Camera,
-    /// Pixels, places a pixel, background, ground, gloss.
-    pub picture: RenderOptions,
+    /// Size, samples per pixel, background, ground, gloss.
+    pub render: RenderOptions,
 }
 
 impl Default for BlockOptions {
-    /// 800 × 800 pixels of 3 × 3 places on white, from above a corner, dull: the top keeps its colours, the sides are in gentle shade.
+    /// 800 × 800 pixels with 3 × 3 samples each, on white, seen from above a corner, without gloss: the top keeps its colours, the sides are slightly shaded.
     fn default() -> Self {
         let camera = Camera {
             azimuth: 38.0,
@@ -26,7 +26,7 @@ impl Default for BlockOptions {
             field_of_view: 22.0,
             up: Vector3::z_axis(),
         };
-        let picture = RenderOptions {
+        let render = RenderOptions {
             width: 800,
             height: 800,
             samples: 3,
@@ -34,27 +34,27 @@ impl Default for BlockOptions {
             ground: true,
             gloss: 0.0,
         };
-        Self { camera, picture }
+        Self { camera, render }
     }
 }
 
 impl BlockOptions {
-    /// With this many pixels.
+    /// Sets the size in pixels.
     ///
     /// ```
     /// # use stereology_render::BlockOptions;
-    /// assert_eq!(BlockOptions::default().with_size(300, 200).picture.width, 300);
+    /// assert_eq!(BlockOptions::default().with_size(300, 200).render.width, 300);
     /// ```
     #[must_use]
     pub const fn with_size(self, width: u32, height: u32) -> Self {
         Self {
-            picture: self.picture.with_size(width, height),
+            render: self.render.with_size(width, height),
             ..self
         }
     }
 }
 
-/// Picture of the box from the origin to `sides`: its top and two sides, cut from whatever `colour` says is at a point (sRGB-encoded values / 255).
+/// Renders the box from the origin to `sides`: its top and two sides, with the colour that `colour` gives at each point (sRGB-encoded values / 255).
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ impl BlockOptions {
 /// let grey = render_block(&|_| [0.5; 3], Vector3::repeat(1.0), &BlockOptions::default().with_size(101, 101))?;
 /// let top = grey.get_pixel(50, 30).0[0];
 /// assert!(top.abs_diff(128) <= 2); // the top keeps its colour
-/// assert!(grey.get_pixel(35, 65).0[0] < top); // the sides are in shade
+/// assert!(grey.get_pixel(35, 65).0[0] < top); // the sides are shaded
 /// assert_eq!(grey.get_pixel(2, 2).0, [255; 3]);
 /// # Ok::<(), stereology_render::RenderError>(())
 /// ```
@@ -79,5 +79,5 @@ pub fn render_block(colour: Colour<'_>, sides: Vector3<f64>, options: &BlockOpti
     }
     let middle = 0.5 * sides;
     let block = TriangleMesh::cuboid(sides.into()).mapped(|p| Point3::from(p.coords + middle));
-    render_mesh(&block, colour, &options.camera, &options.picture)
+    render_mesh(&block, colour, &options.camera, &options.render)
 }

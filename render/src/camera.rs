@@ -1,33 +1,33 @@
-//! Where the picture is taken from.
+//! The position of the camera.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use stereology_shape::TriangleMesh;
 
-/// A camera that looks at the middle of the object.
+/// A camera directed at the centre of the object.
 ///
 /// ```
 /// use stereology_render::Camera;
 /// let from_above = Camera { elevation: 60.0, ..Camera::default() };
-/// assert!(from_above.distance.is_none()); // as near as shows all
+/// assert!(from_above.distance.is_none()); // automatic: the whole object is visible
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Degrees around the upright axis: at 0 the camera stands on the side of +z if y is up, of −y if z is up; at 90 on the side of +x.
+    /// Degrees around the vertical axis: 0 is the side of +z if y is up and of −y if z is up; 90 is the side of +x.
     pub azimuth: f64,
     /// Degrees above the horizon, −89 to 89.
     pub elevation: f64,
-    /// From the camera to the middle of the object, in its unit of length; `None`: as near as shows all of it.
+    /// Distance from the camera to the centre of the object, in its unit of length; `None`: the nearest from which all of it is visible.
     pub distance: Option<f64>,
-    /// Angle of view across the shorter side of the picture, in degrees, 1 to 120; small angles look from afar.
+    /// Field of view along the shorter side of the image, in degrees, 1 to 120; with automatic distance small angles place the camera far away.
     pub field_of_view: f64,
-    /// The direction that is up in the picture; y in most mesh files, z in a solid.
+    /// The direction that is up in the image; y in most mesh files, z in a solid.
     pub up: UnitVector3<f64>,
 }
 
 impl Camera {
-    /// On the side of the object that `direction` points to, with `up` up.
+    /// Places the camera on the side of the object to which `direction` points, with `up` up.
     ///
-    /// A zero or infinite direction is that of [`Camera::default`].
+    /// A zero or infinite direction gives the direction of [`Camera::default`].
     ///
     /// ```
     /// use nalgebra::Vector3;
@@ -54,7 +54,7 @@ impl Camera {
         }
     }
 
-    /// As near as shows all of the mesh from every side, at one distance: for turntables.
+    /// Sets the smallest distance from which all of the mesh is visible from every side: for turntables.
     ///
     /// ```
     /// use stereology_render::Camera;
@@ -81,7 +81,7 @@ impl Camera {
         }
     }
 
-    /// From the object towards the camera, and the level directions to where it would stand at azimuth 0 and at 90.
+    /// Direction from the object to the camera, and the horizontal directions of azimuth 0 and 90.
     pub(crate) fn out(&self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let (azimuth, elevation) = (self.azimuth.to_radians(), self.elevation.to_radians());
         let front = if self.up.y.abs() > 0.9 {
@@ -111,23 +111,23 @@ impl Default for Camera {
     }
 }
 
-/// A camera in its place.
+/// A camera at its position.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
     pub(crate) eye: Point3<f64>,
     pub(crate) forward: Vector3<f64>,
     right: Vector3<f64>,
     up: Vector3<f64>,
-    /// Half the shorter side of the picture at distance 1.
+    /// Half the shorter side of the image at distance 1.
     half: f64,
     size: [f64; 2],
 }
 
-/// Share of the picture that the object may fill, each way.
+/// Fraction of the image that the object may fill, along each axis.
 const FILL: f64 = 0.84;
 
 impl View {
-    /// Puts the camera so that all points are seen; they must not be empty.
+    /// Places the camera so that all points are visible; `points` must not be empty.
     pub(crate) fn new(camera: &Camera, points: &[Point3<f64>], [width, height]: [u32; 2]) -> Self {
         let (out, _) = camera.out();
         let forward = -out;
@@ -143,7 +143,8 @@ impl View {
         let mut target = nalgebra::center(&low, &high);
         let mut distance = camera.distance.unwrap_or(0.0);
         if camera.distance.is_none() {
-            // Seen from `distance`, a point at (x, y) and `near` towards the camera needs |x| <= room (distance - near). The target moves across until both sides need the same.
+            // From `distance`, a point at (x, y) and `near` towards the camera needs |x| <= room (distance - near).
+            // The target moves sideways until both sides need the same distance.
             let needs = |axis: &Vector3<f64>, room: f64| {
                 points.iter().fold([f64::NEG_INFINITY; 2], |needs, p| {
                     let (across, near) = ((p - target).dot(axis), (p - target).dot(&out));
@@ -156,7 +157,7 @@ impl View {
                 .map(|p| (p - target).dot(&out))
                 .fold(f64::NEG_INFINITY, f64::max);
             target += 0.5 * room[0] * (x[0] - x[1]) * right + 0.5 * room[1] * (y[0] - y[1]) * up;
-            // What is seen edge-on needs no room, but must not touch the camera.
+            // A mesh seen edge-on needs no room, but must not touch the camera.
             let clear = nearest + 0.05 * (high - low).amax();
             distance = (0.5 * (x[0] + x[1])).max(0.5 * (y[0] + y[1])).max(clear);
         }
@@ -170,7 +171,7 @@ impl View {
         }
     }
 
-    /// Direction through a place of the picture, in pixels from its top left corner; not of length 1.
+    /// Direction through a point of the image, in pixels from the top left corner; not normalised.
     pub(crate) fn direction(&self, x: f64, y: f64) -> Vector3<f64> {
         let shorter = 0.5 * self.size[0].min(self.size[1]) / self.half;
         self.forward + (x - 0.5 * self.size[0]) / shorter * self.right - (y - 0.5 * self.size[1]) / shorter * self.up
@@ -184,9 +185,10 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The automatic distance shows every point, within the share of the picture it may fill, and fills it one way unless it would touch the object.
+        /// At the automatic distance every point lies within the fraction of the image that the object may fill, and reaches it along one axis unless the
+        /// camera would touch the object.
         #[test]
-        fn all_is_seen(
+        fn all_is_visible(
             mut points in prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64).prop_map(Point3::from), 1..20),
             azimuth in 0.0..360.0_f64, elevation in -80.0..80.0_f64, field_of_view in 5.0..90.0_f64, wide in 50_u32..200,
         ) {
@@ -204,7 +206,7 @@ mod tests {
                 let half = [view.half * view.size[0] / view.size[0].min(100.0), view.half * 100.0 / view.size[0].min(100.0)];
                 fill = fill.max(to.dot(&view.right).abs() / depth / half[0]).max(to.dot(&view.up).abs() / depth / half[1]);
             }
-            // Fuller only if the camera would touch the object.
+            // Less full only if the camera would touch the object.
             let (low, high) = points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)));
             prop_assert!(fill < 0.85 && (fill > 0.83 || nearest < 0.051 * (high - low).amax()), "{fill} {nearest}");
         }

@@ -1,35 +1,36 @@
-//! Boxes around boxes around triangles, four at a time, in single precision.
+//! Bounding volume hierarchy of triangles with four children per node, in single precision.
 //!
-//! The tree is that of the crate `bvh` (surface area heuristic); every second floor of it is taken out, so that a ray asks four boxes at once. Boxes are rounded outwards by more than a ray's own rounding, so none that is touched is lost;
-//! what is in them is tested by the caller in double precision.
+//! The tree is built by the crate `bvh` (surface area heuristic); every second level of it is removed, so that a ray tests four
+//! boxes at once. Boxes are enlarged by more than the rounding error of a ray, so no box that a ray touches is missed; the caller
+//! tests the triangles in double precision.
 
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::{Bvh, BvhNode};
 use nalgebra::{Point3, Vector3};
 
-/// A box tree over triangles.
+/// A hierarchy of bounding boxes of triangles.
 pub(crate) struct Hierarchy {
     nodes: Vec<Node>,
-    /// Places are measured from here, in this length, so that all lie in −1..1.
+    /// Origin and unit of length of the boxes: all coordinates lie in −1..1.
     middle: Point3<f64>,
     reach: f64,
-    /// Boxes that may wait to be looked at while a ray is followed.
+    /// Largest number of boxes on the stack during a traversal.
     most_waiting: usize,
 }
 
-/// Four boxes and what is in each.
+/// Four boxes and their children.
 struct Node {
-    /// By axis: the low and the high sides.
+    /// By axis: low and high sides.
     sides: [[[f32; 4]; 2]; 3],
     child: [u32; 4],
 }
 
-/// The child is a triangle, not a node.
+/// Bit of a child that is a triangle rather than a node.
 const TRIANGLE: u32 = 1 << 31;
-/// So many waiting boxes need no memory of the heap: a tree of 20 floors.
+/// A stack of up to this many boxes needs no heap memory: a tree of 20 levels.
 const FEW_WAITING: usize = 64;
-/// More than what a ray of length 4 loses to single precision.
+/// More than the rounding error of a ray of length 4 in single precision.
 const MARGIN: f32 = 2e-6;
 
 struct Facet {
@@ -54,7 +55,7 @@ impl BHShape<f64, 3> for Facet {
 }
 
 impl Hierarchy {
-    /// Over at least one triangle, not all corners in one point.
+    /// Of at least one triangle; not all corners coincide.
     pub(crate) fn new(corners: &[[Point3<f64>; 3]]) -> Self {
         let mut facets: Vec<Facet> = corners
             .iter()
@@ -80,14 +81,14 @@ impl Hierarchy {
         hierarchy
     }
 
-    /// Takes a node of the binary tree and its children's children, on this floor of ours; returns its number here.
+    /// Adds a node of the binary tree together with its grandchildren at level `floor`; returns the number of the new node.
     #[allow(clippy::cast_possible_truncation, reason = "meshes have fewer than 2^31 triangles")]
     fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize, floor: usize) -> u32 {
-        // A node is taken away and up to four are put there for it.
+        // A traversal replaces a node on the stack by up to four children.
         self.most_waiting = self.most_waiting.max(3 * floor + 1);
         let mut below = vec![(root, facets_bounds(tree, facets, root))];
         while below.len() < 4 {
-            // The largest box that can be opened is opened.
+            // Replace the largest box that is a node by its two children.
             let opened = below
                 .iter()
                 .enumerate()
@@ -128,7 +129,10 @@ impl Hierarchy {
         number as u32
     }
 
-    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first; `visit` returns how far it still wants to look, or `None` to end. `direction` has length 1; a ray that is no number meets nothing.
+    /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first.
+    ///
+    /// `visit` returns the new limit of the distance, or `None` to end. `direction` has length 1; a ray with NaN or infinite
+    /// coordinates meets nothing.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "boxes have a margin for single precision"
@@ -141,11 +145,11 @@ impl Hierarchy {
         mut visit: impl FnMut(usize) -> Option<f64>,
     ) {
         let offset = (origin - self.middle) / self.reach;
-        // A ray that is no number would meet every box, those that are not there as well.
+        // A ray with NaN would meet every box, including unused ones.
         if !offset.iter().chain(direction.iter()).all(|x| x.is_finite()) {
             return;
         }
-        // From far away single precision sees nothing: begin where the ray is nearest to the ball around all.
+        // Far origins exceed single precision: start where the ray comes near the bounding sphere.
         let skipped = (-offset.dot(direction) - 1.5).max(0.0);
         let start = (offset + skipped * direction).map(|x| x as f32);
         let inverse = direction.map(|x| (x as f32).recip());
@@ -158,7 +162,7 @@ impl Hierarchy {
             many.resize(self.most_waiting, (0, 0.0));
             &mut many[..]
         };
-        // The first to be looked at is the root.
+        // The stack starts with the root.
         let mut waiting = 1;
         while waiting > 0 {
             waiting -= 1;
@@ -178,7 +182,7 @@ impl Hierarchy {
             let first = waiting;
             for (k, &entry) in entries.iter().enumerate() {
                 if entry < f32::INFINITY {
-                    // Farthest at the bottom: inserted in order.
+                    // Keep the farthest at the bottom of the stack.
                     let mut place = waiting;
                     while place > first && stack[place - 1].1 < entry {
                         stack[place] = stack[place - 1];
@@ -193,7 +197,7 @@ impl Hierarchy {
 }
 
 impl Node {
-    /// Where a ray enters each of the boxes before `far`; infinite where it does not.
+    /// Distance at which a ray enters each box before `far`; infinite where it does not.
     fn entries(&self, start: &Vector3<f32>, inverse: &Vector3<f32>, far: f32) -> [f32; 4] {
         let (mut near, mut end) = ([0.0_f32; 4], [far; 4]);
         for axis in 0..3 {
@@ -201,7 +205,7 @@ impl Node {
             let back = usize::from(by < 0.0);
             let (first, last) = (&self.sides[axis][back], &self.sides[axis][1 - back]);
             let along = |sides: &[f32; 4]| sides.map(|side| (side - from) * by);
-            // 0 · ∞, of a ray in the plane of a side, compares false: such a side does not bound.
+            // A ray in the plane of a side gives 0 · ∞ = NaN, which compares false: such a side does not bound the interval.
             near = larger(along(first), near);
             end = smaller(along(last), end);
         }
@@ -209,7 +213,7 @@ impl Node {
     }
 }
 
-/// The larger of each pair, the second where either is no number: one instruction for all four.
+/// The larger of each pair, the second where either is NaN: one instruction for all four.
 fn larger(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
 }

@@ -1,41 +1,37 @@
-//! Light followed backwards: what falls on a surface from the key light, the sky, and other surfaces in turn.
+//! Path tracing: the light that falls on a surface from the key light, the sky and other surfaces.
 
-#![allow(clippy::cast_possible_truncation, reason = "light is f32 where it is seen")]
-
-use crate::hollows::{Hollows, Start};
-use crate::light::{Studio, about};
-use crate::scene::{Scene, Surface};
+use crate::light::{Studio, about, single};
+use crate::object::{Object, Start};
+use crate::scene::Surface;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use stereology_imaging::linear;
 
 pub(crate) type Colour<'a> = &'a (dyn Fn(&Point3<f64>) -> [f32; 3] + Sync);
 
-/// Linear light of three primaries.
+/// Linear light, three primaries.
 pub(crate) type Rgb = Vector3<f32>;
 
-/// A ray of light starts this share of the scene's size above the surface.
+/// A ray of light starts this fraction of the extent above the surface.
 const LIFT: f64 = 1e-6;
-/// The ground is seen, and throws shadows and light, within this many sizes of the object.
+/// The ground is visible, receives shadows and reflects light within this many extents of the object.
 pub(crate) const GROUND_REACH: f64 = 4.0;
-/// Light goes on from surface to surface with at most this chance, so every path ends.
-const MOST_LIVELY: f32 = 0.95;
+/// Largest probability that a path continues at a surface, so that every path ends.
+const MOST_LIKELY: f32 = 0.95;
 
-/// What light meets.
+/// The scene: object, ground and light.
 pub(crate) struct World<'a> {
-    pub(crate) scene: Scene,
+    pub(crate) object: Object<'a>,
     pub(crate) studio: Studio,
     pub(crate) colour: Colour<'a>,
-    pub(crate) hollows: Option<Hollows<'a>>,
     /// Height of the ground along `up`, if there is one.
     pub(crate) ground: Option<f64>,
     pub(crate) up: UnitVector3<f64>,
-    /// Largest extent of the object.
-    pub(crate) extent: f64,
+    /// Centre of the object's bounding box.
     pub(crate) middle: Point3<f64>,
     pub(crate) gloss: f64,
 }
 
-/// What a ray meets.
+/// The first thing that a ray meets.
 pub(crate) enum Met {
     Sky,
     Ground(Point3<f64>),
@@ -49,37 +45,42 @@ impl World<'_> {
             let distance = (height - from.point.coords.dot(&self.up)) / direction.dot(&self.up);
             (distance > 0.0).then_some(distance)
         });
-        if let Some(surface) = self.object_along(from, direction, ground.unwrap_or(f64::INFINITY)) {
+        if let Some(surface) = self
+            .object
+            .first_surface(from, direction, ground.unwrap_or(f64::INFINITY))
+        {
             return Met::Object(surface);
         }
         ground
             .map(|distance| from.point + distance * direction)
-            .filter(|point| (point - self.middle).norm() < GROUND_REACH * self.extent)
+            .filter(|point| (point - self.middle).norm() < GROUND_REACH * self.object.extent)
             .map_or(Met::Sky, Met::Ground)
     }
 
-    /// Where light that leaves or reaches a surface begins.
+    /// Origin of rays that leave a surface.
     pub(crate) fn above(&self, surface: &Surface) -> Start {
         Start {
-            point: surface.start + LIFT * self.extent * surface.normal,
+            point: surface.start + LIFT * self.object.extent * surface.normal,
             inside: surface.inside,
         }
     }
 
-    /// Where light that leaves or reaches the ground begins.
+    /// Origin of rays that leave the ground.
     pub(crate) fn above_ground(&self, point: &Point3<f64>) -> Start {
         Start {
-            point: point + LIFT * self.extent * self.up.into_inner(),
+            point: point + LIFT * self.object.extent * self.up.into_inner(),
             inside: false,
         }
     }
 
-    /// Linear colour of the object, at most white.
+    /// Linear colour of the object, at most 1 in each primary.
     pub(crate) fn colour_at(&self, point: &Point3<f64>) -> Rgb {
         Rgb::from((self.colour)(point).map(|encoded| linear(encoded).min(1.0)))
     }
 
-    /// Light on a surface: of the key in one direction, and from the directions of `sky` about the normal. A face that looks up and is not hidden gets 1 on average.
+    /// Light on a surface: from the key light in one direction, and from the directions of `sky` about the normal.
+    ///
+    /// An unobstructed face that points up receives 1 on average.
     pub(crate) fn light_on(
         &self,
         start: &Start,
@@ -88,33 +89,35 @@ impl World<'_> {
         sky: impl ExactSizeIterator<Item = [f64; 2]>,
         chance: &mut Chance,
     ) -> Rgb {
-        let share = 1.0 / sky.len() as f32;
+        let weight = 1.0 / sky.len() as f32;
         let gathered: Rgb = sky
-            .map(|place| self.radiance(*start, about(normal, place), chance))
+            .map(|sample| self.radiance(*start, about(normal, sample), chance))
             .sum();
-        Rgb::repeat(self.key_light(start, normal, key)) + share * gathered
+        Rgb::repeat(self.key_light(start, normal, key)) + weight * gathered
     }
 
-    fn key_light(&self, start: &Start, normal: &Vector3<f64>, place: [f64; 2]) -> f32 {
-        let direction = self.studio.key_direction(place);
+    fn key_light(&self, start: &Start, normal: &Vector3<f64>, sample: [f64; 2]) -> f32 {
+        let direction = self.studio.key_direction(sample);
         let light = self.studio.key_light(normal, &direction);
-        if light > 0.0 && !self.is_hidden(start, &direction) {
-            light as f32
+        if light > 0.0 && !self.object.blocks(start, &direction) {
+            single(light)
         } else {
             0.0
         }
     }
 
-    /// What comes from a direction but the key light itself: the sky, or a surface lit by the key and by what comes to it in turn (the rendering equation of Kajiya 1986, one path of it, ended by chance).
+    /// Radiance from a direction without the key light itself: the sky, or a surface lit by the key light and by other surfaces.
+    ///
+    /// One path of the rendering equation (Kajiya 1986), ended by Russian roulette.
     fn radiance(&self, mut start: Start, mut direction: Vector3<f64>, chance: &mut Chance) -> Rgb {
         let (mut sum, mut carried) = (Rgb::zeros(), Rgb::repeat(1.0));
         loop {
             let (normal, colour);
             match self.meet(&start, &direction) {
-                Met::Sky => return sum + self.studio.sky(&direction) as f32 * carried,
+                Met::Sky => return sum + single(self.studio.sky(&direction)) * carried,
                 Met::Ground(point) => {
                     normal = self.up.into_inner();
-                    colour = Rgb::repeat(self.studio.ground() as f32);
+                    colour = Rgb::repeat(single(self.studio.ground()));
                     start = self.above_ground(&point);
                 }
                 Met::Object(surface) => {
@@ -124,17 +127,19 @@ impl World<'_> {
                 }
             }
             carried.component_mul_assign(&colour);
-            sum += self.key_light(&start, &normal, chance.place()) * carried;
-            let lively = carried.max().min(MOST_LIVELY);
-            if chance.next() >= f64::from(lively) {
+            sum += self.key_light(&start, &normal, chance.pair()) * carried;
+            let survival = carried.max().min(MOST_LIKELY);
+            if chance.next() >= f64::from(survival) {
                 return sum;
             }
-            carried /= lively;
-            direction = about(&normal, chance.place());
+            carried /= survival;
+            direction = about(&normal, chance.pair());
         }
     }
 
-    /// What a clear coat mirrors towards the viewer (Schlick's Fresnel term, 4 % straight on), the key light's disc a little blurred; and the share of light it keeps from what is below.
+    /// Light that a clear coat reflects towards the viewer, and the fraction of light that it keeps from the surface below.
+    ///
+    /// Schlick's approximation of the Fresnel term, 4 % at normal incidence; the disc of the key light is slightly blurred.
     pub(crate) fn coat(
         &self,
         start: &Start,
@@ -145,22 +150,22 @@ impl World<'_> {
     ) -> (Rgb, f32) {
         let cosine = -direction.dot(normal);
         let mirrored = about(&(direction + 2.0 * cosine * normal).normalize(), [COAT_BLUR * u, v]);
-        let fresnel = (self.gloss * (0.04 + 0.96 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5))) as f32;
+        let fresnel = single(self.gloss * (0.04 + 0.96 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)));
         if mirrored.dot(normal) <= 0.0 {
             return (Rgb::zeros(), fresnel);
         }
         let mut light = self.radiance(*start, mirrored, chance);
-        if self.studio.is_in_key(&mirrored) && !self.is_hidden(start, &mirrored) {
-            light.add_scalar_mut(self.studio.key_radiance() as f32);
+        if self.studio.is_in_key(&mirrored) && !self.object.blocks(start, &mirrored) {
+            light.add_scalar_mut(single(self.studio.key_radiance()));
         }
         (fresnel * light, fresnel)
     }
 }
 
-/// Squared sine of the widest angle by which the coat turns what it mirrors.
+/// Squared sine of the largest angle between a ray that the coat reflects and the mirror direction.
 const COAT_BLUR: f64 = 0.01;
 
-/// Numbers that belong to one place of the picture (splitmix64).
+/// Random numbers of one sample of the image (splitmix64).
 pub(crate) struct Chance(u64);
 
 impl Chance {
@@ -170,7 +175,7 @@ impl Chance {
         chance
     }
 
-    /// From 0 to 1.
+    /// Uniform in [0, 1).
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -179,19 +184,20 @@ impl Chance {
         ((z ^ z >> 31) >> 11) as f64 * f64::EPSILON / 2.0
     }
 
-    fn place(&mut self) -> [f64; 2] {
+    fn pair(&mut self) -> [f64; 2] {
         [self.next(), self.next()]
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Chance, Scene, Start, Studio, World};
+    use super::{Chance, Object, Start, Studio, World};
+    use crate::scene::Scene;
     use nalgebra::{Point3, Vector3};
     use std::f64::consts::PI;
     use stereology_shape::TriangleMesh;
 
-    /// Light on faces that look up, down and away from the key, with nothing in the way, against its integrals.
+    /// Unobstructed light on faces that point up, down and away from the key light equals its integral.
     #[test]
     fn light_in_the_open_is_the_integral_of_the_sky() {
         let world = world(&TriangleMesh::icosphere(1.0, 0), &|_| [0.5; 3]);
@@ -207,7 +213,7 @@ mod tests {
             )
         };
         let away = -(world.studio.key.into_inner() - world.studio.key.z * Vector3::z()).normalize();
-        // Half of the horizon's light, (z − h) ∫ sin² of the height over the half of the sky, half of the ground's.
+        // Half of the light of the horizon, (z − h) ∫ sin² of the elevation over half of the sky, half of the light of the ground.
         let (horizon, zenith, ground) = (0.42, 0.5, 0.36);
         let level = 0.5 * horizon + (zenith - horizon) * 2.0 / (3.0 * PI) + 0.5 * ground;
         for (normal, expected) in [(Vector3::z(), 1.0), (-Vector3::z(), ground), (away, level)] {
@@ -215,9 +221,9 @@ mod tests {
         }
     }
 
-    /// At the middle of the floor of a deep grey well of reflectance ρ, light that was thrown back once or more comes in the colour of the walls: none where they are black.
+    /// Light reflected once or more reaches the floor of a deep well in the colour of its walls, and not at all if they are black.
     #[test]
-    fn hollows_glow_in_their_own_colour() {
+    fn walls_colour_the_light_of_a_cavity() {
         let slab = |low: [f64; 3], high: [f64; 3]| {
             let (low, high) = (Vector3::from(low), Vector3::from(high));
             TriangleMesh::cuboid((high - low).into()).mapped(|p| p + 0.5 * (low + high))
@@ -252,13 +258,15 @@ mod tests {
 
     fn world<'a>(mesh: &TriangleMesh, colour: super::Colour<'a>) -> World<'a> {
         World {
-            scene: Scene::new(mesh),
+            object: Object {
+                scene: Scene::new(mesh),
+                voids: None,
+                extent: 2.0,
+            },
             studio: Studio::new(Vector3::z_axis(), &Vector3::new(-1.0, -1.0, -0.5)),
             colour,
-            hollows: None,
             ground: None,
             up: Vector3::z_axis(),
-            extent: 2.0,
             middle: Point3::origin(),
             gloss: 0.0,
         }

@@ -1,44 +1,40 @@
-//! A tile of the picture: places looked at, light gathered and averaged over near places of the same surface, pixels.
-
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "light is f32 where it is seen; places are numbered within squares"
-)]
+//! Rendering of a tile: samples are traced, light is averaged over nearby samples of the same surface, samples become pixels.
 
 use crate::camera::View;
-use crate::hollows::Start;
+use crate::light::single;
+use crate::object::Start;
 use crate::paths::{Chance, GROUND_REACH, Met, Rgb, World};
 use nalgebra::{Point3, Vector3};
 use stereology_imaging::encoded_byte;
 
-/// Light is averaged over squares of this many places each way.
+/// Light is averaged over squares of this many samples along each axis.
 const SQUARE: usize = 8;
-/// Rays to the sky for each pixel, at least one a place.
-const SKY_RAYS: usize = 18;
-/// Normals of places that are averaged together agree to this cosine.
+/// Rays to the sky per pixel; at least one per sample.
+const SKY_RAYS: u32 = 18;
+/// Light is averaged over samples whose normals differ by an angle of at least this cosine.
 const SAME_NORMAL: f64 = 0.95;
 
-/// All that a picture is made of.
-pub(crate) struct Picture<'a> {
+/// A scene with its camera and sampling.
+pub(crate) struct Rendering<'a> {
     pub(crate) world: World<'a>,
     pub(crate) view: View,
-    /// Places each way in a pixel.
-    pub(crate) samples: usize,
+    /// Samples per pixel along each axis.
+    pub(crate) samples: u32,
     /// Linear light of the background and the ground.
     pub(crate) background: [f32; 3],
 }
 
-/// What is seen at a place of the picture.
+/// What is visible at a point of the image.
 #[derive(Clone, Copy)]
-struct Place {
+struct Sample {
     kind: Kind,
     point: Point3<f64>,
     normal: Vector3<f64>,
     /// Linear.
     colour: Rgb,
-    /// All that falls on the place, grainy.
+    /// Light that falls on the surface, with sampling noise.
     light: Rgb,
-    /// What a clear coat mirrors.
+    /// Light that a clear coat reflects.
     shine: Rgb,
 }
 
@@ -49,42 +45,46 @@ enum Kind {
     Object,
 }
 
-impl Picture<'_> {
-    /// Bytes of the pixels from `corner` on, row by row.
+impl Rendering<'_> {
+    /// Bytes of the pixels of a tile at `corner`, row by row.
     pub(crate) fn tile(&self, corner: [usize; 2], size: [usize; 2]) -> Vec<[u8; 3]> {
-        let reach = self.reach();
-        let [wide, high] = size.map(|n| n * self.samples + 2 * reach);
-        let from = corner.map(|n| (n * self.samples) as i64 - reach as i64);
-        let places: Vec<Place> = (0..wide * high)
-            .map(|i| self.look([from[0] + (i % wide) as i64, from[1] + (i / wide) as i64]))
+        let (reach, per_axis) = (self.reach(), self.samples as usize);
+        let [wide, high] = size.map(|n| n * per_axis + 2 * reach);
+        let from = corner.map(|n| (n * per_axis) as i64 - reach as i64);
+        let samples: Vec<Sample> = (0..wide * high)
+            .map(|i| self.trace([from[0] + (i % wide) as i64, from[1] + (i / wide) as i64]))
             .collect();
         let mut pixels = Vec::with_capacity(size[0] * size[1]);
         for row in 0..size[1] {
             for column in 0..size[0] {
                 let mut sum = Rgb::zeros();
-                for i in 0..self.samples * self.samples {
-                    let x = reach + column * self.samples + i % self.samples;
-                    let y = reach + row * self.samples + i / self.samples;
-                    sum += self.lit(&places, wide, [x, y]);
+                for i in 0..per_axis * per_axis {
+                    let x = reach + column * per_axis + i % per_axis;
+                    let y = reach + row * per_axis + i / per_axis;
+                    sum += self.lit(&samples, wide, [x, y]);
                 }
-                let share = 1.0 / (self.samples * self.samples) as f32;
-                pixels.push(sum.map(|light| encoded_byte(light * share)).into());
+                let weight = 1.0 / (per_axis * per_axis) as f32;
+                pixels.push(sum.map(|light| encoded_byte(light * weight)).into());
             }
         }
         pixels
     }
 
-    /// Places before a place in its square; one less behind it. A pixel of a whole square needs no others.
+    /// Number of samples before a sample in its square; the square has one fewer after it. A pixel with a full square needs no neighbours.
     fn reach(&self) -> usize {
-        if self.samples < SQUARE { SQUARE / 2 } else { 0 }
+        if (self.samples as usize) < SQUARE {
+            SQUARE / 2
+        } else {
+            0
+        }
     }
 
-    /// What is seen at a place, and its light in a few directions that belong to this place alone.
-    fn look(&self, place: [i64; 2]) -> Place {
-        let [x, y] = place.map(|n| (n as f64 + 0.5) / self.samples as f64);
+    /// Traces one sample: the visible surface, and its light from a few directions that only this sample uses.
+    fn trace(&self, index: [i64; 2]) -> Sample {
+        let [x, y] = index.map(|n| (n as f64 + 0.5) / f64::from(self.samples));
         let (eye, direction) = (self.view.eye, self.view.direction(x, y).normalize());
         let world = &self.world;
-        let mut seen = Place {
+        let mut seen = Sample {
             kind: Kind::Background,
             point: eye,
             normal: world.up.into_inner(),
@@ -111,31 +111,31 @@ impl Picture<'_> {
                 world.above(&surface)
             }
         };
-        let rays = (SKY_RAYS / (self.samples * self.samples)).max(1) as u32;
-        let mut chance = Chance::new(place);
-        let sky = (0..rays as usize).map(|ray| spread(place, ray as u32, rays));
-        seen.light = world.light_on(&start, &seen.normal, spread(place, 0, 1), sky, &mut chance);
+        let rays = (SKY_RAYS / (self.samples * self.samples)).max(1);
+        let mut chance = Chance::new(index);
+        let sky: Vec<[f64; 2]> = (0..rays).map(|ray| spread(index, ray, rays)).collect();
+        seen.light = world.light_on(&start, &seen.normal, spread(index, 0, 1), sky.into_iter(), &mut chance);
         if seen.kind == Kind::Object && world.gloss > 0.0 {
-            let (shine, kept) = world.coat(&start, &seen.normal, &direction, spread(place, 0, 1), &mut chance);
+            let (shine, kept) = world.coat(&start, &seen.normal, &direction, spread(index, 0, 1), &mut chance);
             seen.shine = shine;
             seen.light *= 1.0 - kept;
         }
         seen
     }
 
-    /// Linear light that leaves a place towards the camera: its own colour, the light of its neighbourhood.
-    fn lit(&self, places: &[Place], wide: usize, [x, y]: [usize; 2]) -> Rgb {
-        let own = &places[y * wide + x];
+    /// Linear light from a sample to the camera: its own colour, times the light averaged over its neighbourhood.
+    fn lit(&self, samples: &[Sample], wide: usize, [x, y]: [usize; 2]) -> Rgb {
+        let own = &samples[y * wide + x];
         if own.kind == Kind::Background {
             return own.colour;
         }
-        // Two places of one surface lie across its normal from each other, as far as it is flat.
-        let extent = self.world.extent;
+        // Two points of a nearly flat surface differ by a vector perpendicular to its normal.
+        let extent = self.world.object.extent;
         let far = 0.02 * extent;
         let reach = self.reach();
         let (mut light, mut shine, mut count) = (Rgb::zeros(), Rgb::zeros(), 0.0);
         for row in y - reach..(y + reach).max(y + 1) {
-            for other in &places[row * wide + x - reach..(row * wide + x + reach).max(row * wide + x + 1)] {
+            for other in &samples[row * wide + x - reach..(row * wide + x + reach).max(row * wide + x + 1)] {
                 let apart = other.point - own.point;
                 let same = other.kind == own.kind
                     && other.normal.dot(&own.normal) > SAME_NORMAL
@@ -150,8 +150,8 @@ impl Picture<'_> {
         }
         let (light, shine) = (light / count, shine / count);
         if own.kind == Kind::Ground {
-            // The ground is a shadow on the background: full light is the background itself, and far away there is no shadow.
-            let away = ((own.point - self.world.middle).norm() / (GROUND_REACH * extent)) as f32;
+            // The ground shows only a shadow on the background: in full light it is the background, and far away there is no shadow.
+            let away = single((own.point - self.world.middle).norm() / (GROUND_REACH * extent));
             let fade = (1.0 - away * away).max(0.0);
             return own
                 .colour
@@ -161,15 +161,17 @@ impl Picture<'_> {
     }
 }
 
-/// A point of the unit square that belongs to a place and a ray.
+/// Point of the unit square for a ray of a sample.
 ///
-/// The places of a square of 8 × 8 are numbered as in a dither matrix and take the points of one evenly spread sequence (R₂, additive recurrence with the plastic number) in turn. Whatever 8 × 8 places the light is averaged over, every point of
-/// the sequence occurs once: no grain where the light changes slowly.
-fn spread(place: [i64; 2], ray: u32, rays: u32) -> [f64; 2] {
+/// The samples of a square of 8 × 8 are numbered as in a dither matrix and take successive points of one low-discrepancy
+/// sequence (R₂, additive recurrence with the plastic number). Every square of 8 × 8 samples contains each point of the sequence
+/// once, so there is no noise where the light changes slowly.
+fn spread(index: [i64; 2], ray: u32, rays: u32) -> [f64; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
-    let [x, y] = place.map(|n| n.rem_euclid(SQUARE as i64) as u32);
-    let number = (0..3).fold(0, |number, bit| {
-        number << 2 | ((x ^ y) >> bit & 1) << 1 | (y >> bit & 1)
+    let [x, y] = index.map(|n| n.rem_euclid(SQUARE as i64));
+    let number = (0..3).fold(0_u8, |number, bit| {
+        let odd = |n: i64| u8::from(n >> bit & 1 == 1);
+        number << 2 | odd(x ^ y) << 1 | odd(y)
     });
-    STEPS.map(|step| (0.5 + f64::from(number * rays + ray) * step).fract())
+    STEPS.map(|step| (0.5 + f64::from(u32::from(number) * rays + ray) * step).fract())
 }

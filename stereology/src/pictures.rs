@@ -47,7 +47,7 @@ pub fn picture_of_solid(
     let voids = |p: &Point3<f64>| solid.void_distance_at(&place(p));
     let mut material = Material::new(&colour);
     if !solid.voids().is_empty() {
-        material = material.with_hollows(&voids);
+        material = material.with_voids(&voids);
     }
     render_material(mesh, &material, camera, options, progress)
 }

@@ -90,8 +90,8 @@ impl Render {
         let (mesh, seen) = self.scene(&solid)?;
         let options = RenderOptions {
             samples: self.samples,
-            gloss: self.gloss.unwrap_or(seen.picture.gloss),
-            ..seen.picture.with_size(self.size as u32, self.size as u32)
+            gloss: self.gloss.unwrap_or(seen.render.gloss),
+            ..seen.render.with_size(self.size as u32, self.size as u32)
         };
         let mut camera = self.camera_of(seen.camera)?;
         if self.turntable.is_some() {
@@ -155,7 +155,13 @@ impl Render {
         let placement = Placement::of(&mesh, solid, self.period);
         mesh.vertices.iter_mut().for_each(|v| *v = placement.apply(v));
         let (camera, picture) = (Camera::default(), RenderOptions::default());
-        Ok((mesh, BlockOptions { camera, picture }))
+        Ok((
+            mesh,
+            BlockOptions {
+                camera,
+                render: picture,
+            },
+        ))
     }
 
     fn camera_of(&self, usual: Camera) -> Result<Camera, Failure> {

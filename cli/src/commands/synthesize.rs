@@ -371,7 +371,10 @@ impl Synthesize {
 fn cube(solid: &stereology::volume::Solid) -> Result<RgbImage, Failure> {
     let sides = solid.period().sides();
     let block = TriangleMesh::cuboid(sides.into()).mapped(|p| p + 0.5 * sides);
-    let BlockOptions { camera, picture } = BlockOptions::default();
+    let BlockOptions {
+        camera,
+        render: picture,
+    } = BlockOptions::default();
     picture_of_solid(
         solid,
         &block,

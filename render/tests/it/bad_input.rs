@@ -1,4 +1,4 @@
-//! What cannot be shown is refused with a reason.
+//! Invalid input is refused with a reason.
 
 use nalgebra::{Point3, Vector3};
 use std::ops::ControlFlow;
@@ -37,9 +37,9 @@ fn broken_meshes() {
     );
 }
 
-/// Open meshes and triangles without area are shown as far as they can be.
+/// Open meshes and triangles without area are rendered.
 #[test]
-fn poor_meshes_are_shown() {
+fn poor_meshes_are_rendered() {
     let small = RenderOptions::default().with_size(16, 16);
     let mut poor = TriangleMesh::cuboid([1.0; 3]);
     poor.triangles.truncate(7);
@@ -96,23 +96,23 @@ fn impossible_options() {
     assert!(matches!(refused, Err(RenderError::Sides { .. })));
 }
 
-/// Distances to voids may be infinite where there is no void, whichever way a wall's normal is asked; what is no number ends the way of a ray.
+/// Distances to voids may be infinite where there is no void, on either side of a wall; a distance of NaN ends a ray.
 #[test]
-fn distances_that_are_infinite_or_no_numbers() {
+fn distances_that_are_infinite_or_nan() {
     let cube = TriangleMesh::cuboid([1.0; 3]);
     let options = RenderOptions::default().with_size(48, 48);
-    let picture = |distance: &(dyn Fn(&Point3<f64>) -> f64 + Sync)| {
-        let material = Material::new(&|_| [0.7; 3]).with_hollows(distance);
+    let image = |distance: &(dyn Fn(&Point3<f64>) -> f64 + Sync)| {
+        let material = Material::new(&|_| [0.7; 3]).with_voids(distance);
         render_material(&cube, &material, &Camera::default(), &options, &|_| {
             ControlFlow::Continue(())
         })
         .unwrap()
     };
     let ball = |p: &Point3<f64>| (p - Point3::new(0.0, 0.5, 0.0)).norm() - 0.35;
-    // The wall of the void lies in the plane beyond which there is said to be none.
+    // The wall of the void lies in the plane beyond which the distance is infinite.
     let walled = |p: &Point3<f64>| if p.x > 0.0 { f64::INFINITY } else { ball(p).max(p.x) };
-    let whole = picture(&|_| f64::INFINITY);
-    assert_ne!(picture(&walled), whole);
-    picture(&|p| if p.z > 0.1 { f64::NAN } else { ball(p) });
-    picture(&|p| if p.x > 0.1 { f64::NEG_INFINITY } else { ball(p) });
+    let whole = image(&|_| f64::INFINITY);
+    assert_ne!(image(&walled), whole);
+    image(&|p| if p.z > 0.1 { f64::NAN } else { ball(p) });
+    image(&|p| if p.x > 0.1 { f64::NEG_INFINITY } else { ball(p) });
 }

@@ -1,5 +1,5 @@
-//! Laws of pictures.
+//! Properties of rendered images.
 #![expect(clippy::unwrap_used, reason = "a failing test panics")]
 
 mod bad_input;
-mod pictures;
+mod images;

@@ -56,7 +56,7 @@ fn picture(things: &[Thing<'_>], camera: &Camera, options: &RenderOptions, file:
         triangles: Vec::new(),
     };
     let all = things.iter().fold(none, |all, thing| all.with(&thing.mesh));
-    let material = Material::new(&colour).with_hollows(&voids);
+    let material = Material::new(&colour).with_voids(&voids);
     render_material(&all, &material, camera, options, &|_| ControlFlow::Continue(()))?
         .save(file)
         .with_context(|| format!("{} cannot be written", file.display()))

@@ -1,47 +1,48 @@
-//! Pictures of meshes.
+//! Rendering of meshes.
 
 use crate::camera::{Camera, View};
-use crate::hollows::Hollows;
 use crate::light::Studio;
+use crate::object::{Object, Voids};
 use crate::paths::{Colour, World};
 use crate::scene::Scene;
-use crate::tile::Picture;
+use crate::tile::Rendering;
 use image::RgbImage;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_imaging::linear;
+use stereology_metrics::Progress;
 use stereology_shape::TriangleMesh;
 
-/// Pictures have at most this many pixels.
+/// Maximum number of pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
-/// Coordinates are below this, and extents above its inverse, so that squares of areas are numbers.
+/// Coordinates are below this and extents above its inverse, so that squares of areas neither overflow nor vanish.
 const LARGEST: f64 = 1e60;
-/// The ground lies this share of the extent below the object, so that light finds its way into voids that stand on it.
+/// The ground lies this fraction of the extent below the object, so that light reaches voids that open towards it.
 const GAP: f64 = 1e-4;
 /// Edge of a tile in pixels.
 const TILE: usize = 32;
 
-/// How a picture is made.
+/// Options of [`render_mesh`] and [`render_material`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Pixels along a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Each pixel is looked at in samples × samples places, 1 to 16.
+    /// Samples per pixel along each axis, 1 to 16.
     pub samples: u32,
     /// Colour behind the object and of the ground, encoded values / 255.
     pub background: [f32; 3],
-    /// Whether the object stands on a ground and throws its shadow on it.
+    /// Whether the object stands on a ground plane and casts a shadow on it.
     pub ground: bool,
-    /// Strength of a clear coat that mirrors the sky: 0 is dull stone, 1 polished.
+    /// Strength of a clear coat that reflects the sky: 0 is matt stone, 1 is polished.
     pub gloss: f64,
 }
 
 impl Default for RenderOptions {
-    /// 1024 × 1024 pixels, 2 × 2 places each, near white, on a ground, half polished.
+    /// 1024 × 1024 pixels with 2 × 2 samples each, on a near-white ground, half polished.
     fn default() -> Self {
         Self {
             width: 1024,
@@ -55,7 +56,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// With this many pixels.
+    /// Sets the size in pixels.
     ///
     /// ```
     /// # use stereology_render::RenderOptions;
@@ -66,59 +67,61 @@ impl RenderOptions {
         Self { width, height, ..self }
     }
 
-    /// With this many places each way in a pixel.
+    /// Sets the samples per pixel along each axis.
     #[must_use]
     pub const fn with_samples(self, samples: u32) -> Self {
         Self { samples, ..self }
     }
 }
 
-/// Why a picture cannot be made.
+/// Why an image cannot be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// There is nothing to see.
+    /// The mesh has no triangles.
     #[error("the mesh has no triangles")]
     Empty,
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names a vertex beyond the {vertices} there are")]
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to a vertex beyond the {vertices} that exist")]
     Index {
         /// Index of the triangle.
         triangle: usize,
         /// Number of vertices.
         vertices: usize,
     },
-    /// A vertex is no finite point (below 10⁶⁰), or all are the same.
+    /// A vertex is not finite (below 10⁶⁰), or all vertices coincide.
     #[error("the mesh's vertices must be finite and not all the same{}", match vertex { Some(i) => format!("; vertex {i} is not finite"), None => String::new() })]
     Vertices {
         /// The first vertex that is not finite.
         vertex: Option<usize>,
     },
-    /// The box has a side that is no positive length.
-    #[error("the sides of a block are positive finite lengths, not {sides:?}")]
+    /// A side of the block is not a positive length.
+    #[error("the sides of a block must be positive finite lengths, not {sides:?}")]
     Sides {
         /// The sides given.
         sides: [f64; 3],
     },
-    /// No picture has these options.
+    /// An option is out of range.
     #[error("{what}")]
     Options {
         /// What is wrong and what is allowed.
         what: &'static str,
     },
-    /// The callback broke off.
+    /// The progress callback cancelled the work.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Picture of a mesh whose colour is a function of the point.
+/// Renders a mesh whose colour is a function of the point.
 ///
-/// `colour` gets points of the surface in the mesh's coordinates and gives sRGB-encoded values / 255. Any triangles will do, open or not; facets that meet at less than 35° are shaded as one smooth surface. Cost: about 5 rays a place
-/// where the object or its ground is seen, a microsecond or less each; seconds for a million pixels of 2 × 2 places, half a minute of 8 × 8. The same bytes at any number of threads.
+/// `colour` receives points of the surface in the mesh's coordinates and returns sRGB-encoded values / 255. The mesh need not be
+/// closed; facets that meet at less than 35° are shaded as one smooth surface. Cost: about 5 rays per sample of the object or its
+/// ground, a microsecond or less each; seconds for a million pixels with 2 × 2 samples, half a minute with 8 × 8. The bytes do not
+/// depend on the number of threads.
 ///
 /// # Errors
 ///
-/// [`RenderError`] if the mesh is empty or broken, or the camera or the options cannot be.
+/// [`RenderError`] if the mesh is empty or broken, or the camera or an option is invalid.
 ///
 /// # Examples
 ///
@@ -128,8 +131,8 @@ pub enum RenderError {
 ///
 /// let torus = TriangleMesh::torus(2.0, 0.8, 48, 24);
 /// let options = RenderOptions::default().with_size(80, 60);
-/// let picture = render_mesh(&torus, &|p| if p.x > 0.0 { [0.8, 0.2, 0.2] } else { [0.2, 0.2, 0.8] }, &Camera::default(), &options)?;
-/// assert_eq!(picture.dimensions(), (80, 60));
+/// let image = render_mesh(&torus, &|p| if p.x > 0.0 { [0.8, 0.2, 0.2] } else { [0.2, 0.2, 0.8] }, &Camera::default(), &options)?;
+/// assert_eq!(image.dimensions(), (80, 60));
 /// # Ok::<(), stereology_render::RenderError>(())
 /// ```
 pub fn render_mesh(
@@ -142,39 +145,42 @@ pub fn render_mesh(
     render_material(mesh, &material, camera, options, &|_| ControlFlow::Continue(()))
 }
 
-/// What a mesh is made of: its colour at any point, and its voids.
+/// Material of a mesh: its colour at any point, and its voids.
 #[derive(Clone, Copy)]
 pub struct Material<'a> {
     colour: Colour<'a>,
-    hollows: Option<Hollows<'a>>,
+    voids: Option<Voids<'a>>,
 }
 
 impl std::fmt::Debug for Material<'_> {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.debug_struct("Material")
-            .field("hollows", &self.hollows.is_some())
+            .field("voids", &self.voids.is_some())
             .finish_non_exhaustive()
     }
 }
 
 impl<'a> Material<'a> {
-    /// Without voids; `colour` gives sRGB-encoded values / 255.
+    /// A material without voids; `colour` returns sRGB-encoded values / 255.
     #[must_use]
     pub fn new(colour: Colour<'a>) -> Self {
-        Self { colour, hollows: None }
+        Self { colour, voids: None }
     }
 
-    /// With voids, cut open by the mesh: `distance` is that to the nearest surface of a void, negative in one, never longer than the true distance, infinite where there is none. A void's wall has the colour a little behind it. The mesh should be closed.
+    /// Adds voids, which the mesh cuts open.
+    ///
+    /// `distance` returns the signed distance to the nearest surface of a void: negative inside, never more than the true
+    /// distance, infinite where there is no void. The wall of a void has the colour a little behind it. The mesh should be closed.
     #[must_use]
-    pub fn with_hollows(self, distance: &'a (dyn Fn(&Point3<f64>) -> f64 + Sync)) -> Self {
+    pub fn with_voids(self, distance: &'a (dyn Fn(&Point3<f64>) -> f64 + Sync)) -> Self {
         Self {
-            hollows: Some(distance),
+            voids: Some(distance),
             ..self
         }
     }
 }
 
-/// [`render_mesh`] of a material that may have voids, which tells the share that is done, and may be broken off.
+/// [`render_mesh`] for a material that may have voids; reports its progress and can be cancelled.
 ///
 /// # Errors
 ///
@@ -191,12 +197,12 @@ impl<'a> Material<'a> {
 ///
 /// let cube = TriangleMesh::cuboid([1.0; 3]);
 /// let hole = |p: &nalgebra::Point3<f64>| p.x.hypot(p.y) - 0.3;
-/// let material = Material::new(&|_| [0.9, 0.6, 0.3]).with_hollows(&hole);
+/// let material = Material::new(&|_| [0.9, 0.6, 0.3]).with_voids(&hole);
 /// let (camera, options) = (Camera { elevation: 89.0, up: nalgebra::Vector3::z_axis(), ..Camera::default() }, RenderOptions::default().with_size(64, 64));
-/// let picture = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Continue(()))?;
-/// assert!(picture.get_pixel(32, 32).0[0] + 30 < picture.get_pixel(20, 20).0[0]); // little light reaches the ground in it
-/// let broken_off = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Break(()));
-/// assert!(matches!(broken_off, Err(RenderError::Cancelled)));
+/// let image = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Continue(()))?;
+/// assert!(image.get_pixel(32, 32).0[0] + 30 < image.get_pixel(20, 20).0[0]); // little light reaches the ground inside the hole
+/// let cancelled = render_material(&cube, &material, &camera, &options, &|_| ControlFlow::Break(()));
+/// assert!(matches!(cancelled, Err(RenderError::Cancelled)));
 /// # Ok::<(), RenderError>(())
 /// ```
 pub fn render_material(
@@ -204,7 +210,7 @@ pub fn render_material(
     material: &Material<'_>,
     camera: &Camera,
     options: &RenderOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<RgbImage, RenderError> {
     check_mesh(mesh)?;
     check_camera(camera)?;
@@ -228,30 +234,32 @@ pub fn render_material(
         .map(|p| p.coords.dot(&camera.up))
         .fold(f64::INFINITY, f64::min);
     let world = World {
-        scene: Scene::new(mesh),
+        object: Object {
+            scene: Scene::new(mesh),
+            voids: material.voids,
+            extent,
+        },
         studio: Studio::new(camera.up, &view.forward),
         colour: material.colour,
-        hollows: material.hollows,
         ground: options.ground.then_some(bottom - GAP * extent),
         up: camera.up,
-        extent,
         middle: nalgebra::center(&low, &high),
         gloss: options.gloss,
     };
-    let picture = Picture {
+    let rendering = Rendering {
         world,
         view,
-        samples: options.samples as usize,
+        samples: options.samples,
         background: options.background.map(linear),
     };
-    paint(&picture, [options.width, options.height], progress)
+    paint(&rendering, [options.width, options.height], progress)
 }
 
-/// Tiles in any order, each by itself.
+/// Renders the tiles in parallel.
 fn paint(
-    picture: &Picture<'_>,
+    rendering: &Rendering<'_>,
     [width, height]: [u32; 2],
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<RgbImage, RenderError> {
     let (wide, high) = (width as usize, height as usize);
     let corners: Vec<[usize; 2]> = (0..high)
@@ -262,7 +270,7 @@ fn paint(
     let tiles: Option<Vec<Vec<[u8; 3]>>> = corners
         .par_iter()
         .map(|&[x, y]| {
-            let tile = picture.tile([x, y], [TILE.min(wide - x), TILE.min(high - y)]);
+            let tile = rendering.tile([x, y], [TILE.min(wide - x), TILE.min(high - y)]);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(done as f64 / corners.len() as f64)
                 .is_continue()
@@ -326,9 +334,9 @@ pub(crate) fn check_camera(camera: &Camera) -> Result<(), RenderError> {
 fn check_options(options: &RenderOptions) -> Result<(), RenderError> {
     let pixels = u64::from(options.width) * u64::from(options.height);
     let what = if pixels == 0 || pixels > MOST_PIXELS {
-        "a picture has 1 to 2^28 pixels"
+        "an image has 1 to 2^28 pixels"
     } else if !(1..=16).contains(&options.samples) {
-        "a pixel is looked at in 1 to 16 places each way"
+        "a pixel has 1 to 16 samples along each axis"
     } else if !options.background.iter().all(|value| value.is_finite()) {
         "the background must be a colour of finite values"
     } else if !(0.0..=1.0).contains(&options.gloss) {

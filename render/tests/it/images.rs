@@ -1,4 +1,4 @@
-//! What a picture must show, whatever it shows.
+//! Laws that every rendered image obeys.
 
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
@@ -19,29 +19,29 @@ const FLOATING: RenderOptions = RenderOptions {
     gloss: 0.0,
 };
 
-fn bright_pixels(picture: &RgbImage) -> f64 {
-    // A pixel on the rim is partly background; the object is brighter than half of the scale.
-    picture.pixels().filter(|p| p.0[0] > 90).count() as f64
+fn bright_pixels(image: &RgbImage) -> f64 {
+    // A pixel on the rim is partly background; the object is brighter than the middle of the scale.
+    image.pixels().filter(|p| p.0[0] > 90).count() as f64
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// A ball of radius R at distance d is seen as a disc of radius R / √(d² − R²) at distance 1, wherever the camera stands.
+    /// A sphere of radius R at distance d projects to a disc of radius R / √(d² − R²) at distance 1, for every position of the camera.
     #[test]
     fn a_ball_is_a_disc(azimuth in -180.0..180.0_f64, elevation in -80.0..80.0_f64, distance in 3.0..9.0_f64, up_is_z in any::<bool>()) {
         let ball = TriangleMesh::icosphere(2.0, 4);
         let up = if up_is_z { Vector3::z_axis() } else { Vector3::y_axis() };
         let camera = Camera { azimuth, elevation, distance: Some(distance), field_of_view: 50.0, up };
-        let picture = render_mesh(&ball, &|_| [1.0; 3], &camera, &FLOATING).unwrap();
+        let image = render_mesh(&ball, &|_| [1.0; 3], &camera, &FLOATING).unwrap();
         let radius = 45.0 / 25.0_f64.to_radians().tan() / (distance * distance - 1.0).sqrt();
         let disc = PI * radius * radius;
-        // The rim's pixels, 2π radius, are more or less bright; the icosphere is 0.3 % smaller than the ball.
-        prop_assert!((bright_pixels(&picture) - disc).abs() < 0.006 * disc + 1.0 * PI * radius);
+        // The 2π radius pixels of the rim are partly bright; the icosphere is 0.3 % smaller than the sphere.
+        prop_assert!((bright_pixels(&image) - disc).abs() < 0.006 * disc + 1.0 * PI * radius);
     }
 }
 
-/// Three faces are seen, each with the colour of the place asked for, the top in its own colour, the sides darker.
+/// Three faces are visible, each with the colour at its points: the top unchanged, the sides darker.
 #[test]
 fn a_block_shows_three_faces() {
     let sides = Vector3::new(2.0, 3.0, 1.5);
@@ -55,10 +55,10 @@ fn a_block_shows_three_faces() {
             [0.0, 0.0, 1.0]
         }
     };
-    let picture = render_block(&faces, sides, &BlockOptions::default().with_size(160, 120)).unwrap();
+    let image = render_block(&faces, sides, &BlockOptions::default().with_size(160, 120)).unwrap();
     let most = |channel: usize| {
         let others = [(channel + 1) % 3, (channel + 2) % 3];
-        let own = picture.pixels().filter(|p| others.iter().all(|&c| p.0[c] == 0));
+        let own = image.pixels().filter(|p| others.iter().all(|&c| p.0[c] == 0));
         own.fold((0, 0_u8), |(count, most), p| (count + 1, most.max(p.0[channel])))
     };
     let [top, front, side] = [0, 1, 2].map(most);
@@ -72,9 +72,9 @@ fn a_block_shows_three_faces() {
     );
 }
 
-/// The floor of a pit sees less sky than a table.
+/// The floor of a pit receives less light of the sky than a table.
 #[test]
-fn hollows_are_darker() {
+fn cavities_are_darker() {
     let slab = |low: [f64; 3], high: [f64; 3]| {
         let (low, high) = (Vector3::from(low), Vector3::from(high));
         TriangleMesh::cuboid((high - low).into()).mapped(|p| p + 0.5 * (low + high))
@@ -117,15 +117,15 @@ fn bytes_do_not_depend_on_threads() {
             [0.3, 0.2, 0.2]
         }
     };
-    let picture = |threads| {
+    let image = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = RenderOptions::default().with_size(90, 70);
         pool.install(|| render_mesh(&torus, &stripes, &Camera::default(), &options).unwrap())
     };
-    assert!(picture(1) == picture(3));
+    assert!(image(1) == image(3));
 }
 
-/// A shadow falls on the ground, and far from the object the ground is the background.
+/// The object casts a shadow on the ground, and far from the object the ground equals the background.
 #[test]
 fn the_ground_shows_a_shadow_only() {
     let ball = TriangleMesh::icosphere(2.0, 3);
@@ -134,30 +134,30 @@ fn the_ground_shows_a_shadow_only() {
         ground: true,
         ..FLOATING
     };
-    let picture = render_mesh(&ball, &|_| [0.9, 0.0, 0.0], &Camera::default(), &options).unwrap();
-    let ground = picture.pixels().filter(|p| p.0[0] == p.0[1]);
+    let image = render_mesh(&ball, &|_| [0.9, 0.0, 0.0], &Camera::default(), &options).unwrap();
+    let ground = image.pixels().filter(|p| p.0[0] == p.0[1]);
     let darkest = ground.map(|p| p.0[0]).min().unwrap();
     assert!(darkest < 190, "{darkest}");
     for (x, y) in [(0, 0), (119, 0)] {
-        assert!(picture.get_pixel(x, y).0[0].abs_diff(230) <= 1);
+        assert!(image.get_pixel(x, y).0[0].abs_diff(230) <= 1);
     }
 }
 
 #[test]
-fn a_picture_can_be_broken_off() {
+fn rendering_can_be_cancelled() {
     let ball = TriangleMesh::icosphere(1.0, 1);
     let stop = |_| ControlFlow::Break(());
-    let broken = render_material(
+    let cancelled = render_material(
         &ball,
         &Material::new(&|_| [0.5; 3]),
         &Camera::default(),
         &FLOATING,
         &stop,
     );
-    assert_eq!(broken.unwrap_err(), RenderError::Cancelled);
+    assert_eq!(cancelled.unwrap_err(), RenderError::Cancelled);
 }
 
-/// A block with a void at its end looks like the shorter block.
+/// A block with a void at its end is rendered like the shorter block.
 #[test]
 fn a_void_is_cut_away() {
     let whole = TriangleMesh::cuboid([2.0, 2.0, 2.0]);
@@ -177,7 +177,7 @@ fn a_void_is_cut_away() {
         ..Camera::default()
     };
     let target = |mesh: &TriangleMesh, material: &Material<'_>| {
-        // The camera looks at the middle of the mesh: both are given the same, by two far corners of no size.
+        // The camera is directed at the centre of the mesh: degenerate triangles at two far corners give both the same centre.
         let corner = |s: f64| TriangleMesh {
             vertices: vec![Point3::new(s, s, s); 3],
             triangles: vec![[0, 1, 2]],
@@ -185,7 +185,7 @@ fn a_void_is_cut_away() {
         let mesh = mesh.clone().with(&corner(1.0)).with(&corner(-1.0));
         render_material(&mesh, material, &camera, &FLOATING, &|_| ControlFlow::Continue(())).unwrap()
     };
-    let hollow = target(&whole, &Material::new(&colour).with_hollows(&end));
+    let hollow = target(&whole, &Material::new(&colour).with_voids(&end));
     let cut = target(&rest, &Material::new(&colour));
     let off: u32 = hollow
         .iter()

@@ -148,7 +148,10 @@ impl Material {
 
 fn block(solid: &Solid) -> Result<RgbImage> {
     let block = TriangleMesh::cuboid([300.0; 3]).mapped(|p| p + Vector3::repeat(150.0));
-    let BlockOptions { camera, picture } = BlockOptions::default();
+    let BlockOptions {
+        camera,
+        render: picture,
+    } = BlockOptions::default();
     let picture = picture.with_size(SIDE, SIDE);
     let place = |p: &Point3<f64>| *p;
     Ok(picture_of_solid(solid, &block, &place, &camera, &picture, &|_| {

@@ -54,7 +54,7 @@ pub fn draw_readme(folder: &Path) -> Result<()> {
     let plane = SlicePlane::oblique(Vector3::new(1.0, 2.0, 3.0), 90.0)?;
     let section = made.solid.slice(&plane, side, side, 1.0)?;
     let options = BlockOptions {
-        picture: RenderOptions::default().with_size(side, side),
+        render: RenderOptions::default().with_size(side, side),
         ..BlockOptions::default()
     };
     let block = render_block(&|p| made.solid.colour_at(p), Vector3::repeat(320.0), &options)?;

@@ -1,9 +1,9 @@
 //! `cargo xtask`: checks of the workspace, and the way to its studies.
 
 mod tidy;
+mod workspace;
 
 use std::ffi::OsString;
-use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
@@ -56,12 +56,9 @@ fn main() -> Result<()> {
 }
 
 fn ci() -> Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .context("xtask stands inside the workspace")?;
     let status = Command::new("bash")
         .arg(".ci/run")
-        .current_dir(root)
+        .current_dir(workspace::root()?)
         .status()
         .context("bash cannot be run")?;
     ensure!(status.success(), ".ci/run failed");

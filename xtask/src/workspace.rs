@@ -1,0 +1,12 @@
+//! Where the workspace stands.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+/// Folder of the workspace.
+pub fn root() -> Result<&'static Path> {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .context("xtask stands inside the workspace")
+}

@@ -12,10 +12,12 @@
 //! assert_eq!(check_edges(&[0.0, 2.0, 2.0]), Err(EdgesError::NotIncreasing { index: 2 }));
 //! ```
 
+mod edge_rule;
 mod edges;
 mod finding;
 mod progress;
 
+pub use edge_rule::{BoundingBox, EdgeRule, EdgeWeights, SamplingWindow};
 pub use edges::{EdgesError, check_edges};
 pub use finding::Finding;
 pub use progress::Progress;

@@ -109,6 +109,14 @@ pub enum SegmentError {
         /// What it must be.
         requirement: &'static str,
     },
+    /// An edge rule that needs more than a photo shows.
+    #[error(
+        "the edge rule {rule} needs the whole size of profiles that the photo's edge cuts; use associated-point, miles-lantuejoul, or all"
+    )]
+    EdgeRule {
+        /// Name of the rule.
+        rule: &'static str,
+    },
     /// A file could not be written.
     #[error(transparent)]
     Write(#[from] stereology_grid::GridError),

@@ -1,5 +1,7 @@
 //! What a segmentation may be told.
 
+use stereology_metrics::EdgeRule;
+
 use crate::error::SegmentError;
 
 /// What becomes of binder-coloured holes inside a profile.
@@ -10,18 +12,6 @@ pub enum Holes {
     Fill,
     /// They are binder.
     Keep,
-}
-
-/// Which profiles count, and over what area: profiles at the photo's edge are seen in part and large ones meet it more often.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EdgeRule {
-    /// Unbiased counting frame (Gundersen 1977): a profile counts if the upper left corner of its bounding box lies in a frame from which every profile is seen whole. Weight 1 or 0; the area is the frame's.
-    #[default]
-    Frame,
-    /// Every whole profile counts with the photo's area over the area in which a box of its extent fits (Miles 1974, Lantuéjoul 1980); the area is the photo's.
-    MilesLantuejoul,
-    /// Every profile counts once, even if cut; the area is the photo's. Biased; for photos without cut profiles.
-    All,
 }
 
 /// Where the binder's colour comes from.
@@ -62,7 +52,7 @@ pub struct SegmentOptions {
     pub categories: CategoryCount,
     /// Holes in profiles.
     pub holes: Holes,
-    /// Edge rule.
+    /// Which profiles count at the photo's edges, and how much. Rules that need the whole size of profiles that the edge cuts are refused: the counting frame and plus-sampling.
     pub edge_rule: EdgeRule,
     /// Distances to the binder, in its standard deviations, at which a region ends and which it must reach.
     pub thresholds: [f32; 2],
@@ -81,7 +71,7 @@ impl Default for SegmentOptions {
             min_area: 20,
             categories: CategoryCount::Silhouette,
             holes: Holes::Fill,
-            edge_rule: EdgeRule::Frame,
+            edge_rule: EdgeRule::AssociatedPoint,
             thresholds: [5.0, 9.0],
             rise: [0.7, 0.1],
             smoothing: 1.0,
@@ -189,6 +179,9 @@ impl SegmentOptions {
         }
         if let Some(&r) = self.rise.iter().find(|r| !(r.is_finite() && **r >= 0.0)) {
             return refuse("rise", f64::from(r), "must be zero or more");
+        }
+        if let rule @ (EdgeRule::CountingFrame | EdgeRule::PlusSampling) = self.edge_rule {
+            return Err(SegmentError::EdgeRule { rule: rule.name() });
         }
         let [low, high] = self.thresholds;
         if !(low > 0.0 && low <= high && high.is_finite()) {

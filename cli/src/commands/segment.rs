@@ -109,7 +109,7 @@ impl Choices {
                 Holes::Keep => segment::Holes::Keep,
             })
             .with_edge_rule(match self.edge_rule {
-                EdgeRule::Frame => segment::EdgeRule::Frame,
+                EdgeRule::Frame => segment::EdgeRule::AssociatedPoint,
                 EdgeRule::MilesLantuejoul => segment::EdgeRule::MilesLantuejoul,
                 EdgeRule::All => segment::EdgeRule::All,
             });

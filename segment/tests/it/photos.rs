@@ -224,7 +224,7 @@ fn edge_rules_are_unbiased() {
     use rand::{RngExt, SeedableRng};
     let (width, height) = (100_usize, 80_usize);
     let radii = [4.0_f64, 14.0];
-    for rule in [EdgeRule::Frame, EdgeRule::MilesLantuejoul] {
+    for rule in [EdgeRule::AssociatedPoint, EdgeRule::MilesLantuejoul] {
         let mut counted = [[0.0_f64; 400]; 2];
         for (trial, seed) in (0..400).enumerate() {
             let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);

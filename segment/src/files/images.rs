@@ -7,9 +7,11 @@ use ndarray::{Array3, ArrayView3, Axis};
 use stereology_grid::write_atomically;
 use tiff::encoder::{TiffEncoder, colortype};
 
-use crate::{
-    error::SegmentError, label_raster::dimensions, profile::Index, regions::neighbours4, segmentation::Segmentation,
-};
+use crate::error::SegmentError;
+use crate::files::label_raster::dimensions;
+use crate::labels::profile::Index;
+use crate::outlines::regions::neighbours4;
+use crate::segmentation::Segmentation;
 
 /// Colours of the outlines of categories: Okabe & Ito's, which colour-blind readers can tell apart, black left out.
 const OUTLINES: [[u8; 3]; 8] = [

@@ -4,11 +4,9 @@ use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use stereology_imaging::lab;
 
-use crate::{
-    kmeans::{Clusters, kmeans, silhouette},
-    options::CategoryCount,
-    profile::Profile,
-};
+use crate::ground::kmeans::{Clusters, kmeans, silhouette};
+use crate::labels::profile::Profile;
+use crate::options::CategoryCount;
 
 /// Profiles of like colour.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,7 +13,7 @@ use tiff::{
     tags::Tag,
 };
 
-use crate::finding::Finding;
+use stereology_metrics::Finding;
 
 /// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
 const LARGEST_MAP: usize = 1_600_000_000;

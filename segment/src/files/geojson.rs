@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
-use crate::outline::{Outline, Ring};
+use crate::labels::outline::{Outline, Ring};
 
 /// Half a pixel: coordinates are those of pixel centres, from 0, as in segmenteverygrain.
 const CENTRE: f64 = 0.5;

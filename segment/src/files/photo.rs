@@ -5,7 +5,8 @@ use std::{io::Cursor, path::Path};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::Array2;
 
-use crate::{error::SegmentError, finding::Finding};
+use crate::error::SegmentError;
+use stereology_metrics::Finding;
 
 /// A photograph from a file, and what to know about how it was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,12 +76,7 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
     if pixels > most.min(MOST_PIXELS) {
-        return Err(SegmentError::TooLarge {
-            width,
-            height,
-            most: most.min(MOST_PIXELS),
-            gigabytes: (pixels as f64 * BYTES_A_PIXEL / 1e9).ceil(),
-        });
+        return Err(too_large([width, height], most.min(MOST_PIXELS)));
     }
     let orientation = decoder.orientation().map_err(|e| refuse(e.to_string()))?;
     let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| refuse(e.to_string()))?;
@@ -121,10 +117,20 @@ pub fn encoded_image(photo: &RgbImage) -> Array2<[f32; 3]> {
     })
 }
 
-/// Pixels that labels of 32 bits and indices can number.
-const MOST_PIXELS: u64 = 1 << 31;
+/// Pixels that labels and indices of 32 bits can number.
+pub(crate) const MOST_PIXELS: u64 = 1 << 31;
 /// Memory that reading and segmenting take, bytes a pixel.
 const BYTES_A_PIXEL: f64 = 100.0;
+
+/// The refusal of a photo of more than `most` pixels.
+pub(crate) fn too_large([width, height]: [u32; 2], most: u64) -> SegmentError {
+    SegmentError::TooLarge {
+        width,
+        height,
+        most,
+        gigabytes: (f64::from(width) * f64::from(height) * BYTES_A_PIXEL / 1e9).ceil(),
+    }
+}
 
 /// Whether a JPEG's last scan is followed by the end marker; decoders fill what is missing with grey.
 fn has_end(bytes: &[u8]) -> bool {

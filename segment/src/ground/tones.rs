@@ -3,14 +3,10 @@
 use ndarray::Array2;
 use stereology_imaging::distance_transform;
 
-use crate::{
-    binder::BinderModel,
-    kmeans::{Clusters, kmeans, squared_distance},
-    light::{Sample, sample},
-};
+use crate::ground::binder::{BinderModel, GUESSES};
+use crate::ground::kmeans::{Clusters, kmeans, squared_distance};
+use crate::ground::light::{Sample, sample};
 
-/// Main colours looked for.
-pub(crate) const GUESSES: usize = 8;
 /// Distance z of two tones.
 pub(crate) const TONE_DISTANCE: f32 = 9.0;
 /// Distance z of one standard deviation of the binder where no other tone mixes with it: three, beyond which a pixel is none of its, make five.

@@ -1,4 +1,4 @@
-//! Hills of a field: maxima that stand out, and the ground that belongs to each.
+//! Basins of a field: maxima that stand out, and the ground that belongs to each.
 
 use std::cmp::Reverse;
 
@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 /// Every pixel's hill, found by walking up the highest neighbour, and the saddles between hills.
 ///
 /// Walks keep to neighbours in memory; only the saddles, a small part of the pixels, are sorted. Taking all pixels from the highest down gives the same maxima and was three times slower on large regions.
-pub(crate) struct Hills {
+pub(crate) struct Basins {
     width: usize,
     /// Hill of each pixel, [`NONE`] outside.
     of: Array2<u32>,
@@ -25,8 +25,8 @@ pub(crate) struct Hills {
     saddles: Vec<(f32, u32, u32)>,
 }
 
-impl Hills {
-    /// Hills of the pixels whose part is not 0; those of different parts do not touch, pixels of one part do by sides and corners. `given` pixels are tops whatever is around them.
+impl Basins {
+    /// Basins of the pixels whose part is not 0; those of different parts do not touch, pixels of one part do by sides and corners. `given` pixels are tops whatever is around them.
     pub(crate) fn new(field: &Array2<f32>, parts: &Array2<u32>, given: impl Fn(usize) -> bool) -> Self {
         let (height, width) = field.dim();
         let (field, parts) = (field.as_standard_layout(), parts.as_standard_layout());
@@ -115,7 +115,7 @@ impl Hills {
         }
     }
 
-    /// Hills whose top stands at least `h(place, height)` above the saddle to any higher one, by decreasing height.
+    /// Basins whose top stands at least `h(place, height)` above the saddle to any higher one, by decreasing height.
     fn standing_out(&self, h: impl Fn([usize; 2], f32) -> f32) -> Vec<u32> {
         let rank = |hill: u32| {
             let (pixel, height) = self.tops[hill as usize];
@@ -220,7 +220,7 @@ fn highest_first(saddles: &[(f32, u32, u32)]) -> Vec<(f32, u32, u32)> {
 /// ```
 #[must_use]
 pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Array2<u32> {
-    let hills = Hills::new(field, &field.mapv(|v| u32::from(v > 0.0)), |_| false);
+    let hills = Basins::new(field, &field.mapv(|v| u32::from(v > 0.0)), |_| false);
     let mut out = Array2::zeros(field.dim());
     for (number, hill) in (1..).zip(hills.standing_out(h)) {
         out[hills.place(hills.tops[hill as usize].0)] = number;
@@ -254,7 +254,7 @@ pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Arra
 pub fn watershed(field: &Array2<f32>, markers: &Array2<u32>, mask: &Array2<bool>) -> Array2<u32> {
     let markers = markers.as_standard_layout();
     let given = markers.as_slice().unwrap_or_default();
-    let hills = Hills::new(field, &mask.mapv(u32::from), |i| given[i] != 0);
+    let hills = Basins::new(field, &mask.mapv(u32::from), |i| given[i] != 0);
     let tops = (0..).zip(&hills.tops);
     hills.grown(
         tops.map(|(hill, top)| (hill, given[top.0 as usize]))
@@ -265,7 +265,7 @@ pub fn watershed(field: &Array2<f32>, markers: &Array2<u32>, mask: &Array2<bool>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regions::neighbours8;
+    use crate::outlines::regions::neighbours8;
     use proptest::prelude::*;
     use std::collections::BinaryHeap;
     use stereology_imaging::{distance_transform, gaussian_filter};

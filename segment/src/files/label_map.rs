@@ -9,15 +9,14 @@ use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
 use stereology_grid::write_atomically;
 
-use crate::{
-    coco,
-    error::SegmentError,
-    finding::Finding,
-    geojson, imagej_roi,
-    label_raster::{dimensions, ending, narrow, parse_npy, parse_png, parse_tiff, write_npy, write_tiff},
-    outline::{Outline, fill_outlines, outlines},
-    photo::read_bytes,
-};
+use crate::error::SegmentError;
+use crate::files::coco;
+use crate::files::geojson;
+use crate::files::imagej_roi;
+use crate::files::label_raster::{dimensions, ending, narrow, parse_npy, parse_png, parse_tiff, write_npy, write_tiff};
+use crate::files::photo::read_bytes;
+use crate::labels::outline::{Outline, fill_outlines, outlines};
+use stereology_metrics::Finding;
 
 /// A label map from a file, and what to know about how it was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,7 +159,7 @@ fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)
             format!("{overlap} pixels lie in more than one outline; they were given to the smaller one"),
         ));
     }
-    let drawn = crate::profile::distinct(&labels).len();
+    let drawn = crate::labels::profile::distinct(&labels).len();
     let lost = found.len() - drawn + without_area;
     if lost > 0 {
         findings.push(Finding::new("lost-labels", format!("{lost} of {} outlines hold no pixel's centre of their own (points, lines, slivers, or covered by others) and are left out", found.len() + without_area)));

@@ -2,10 +2,12 @@
 
 use ndarray::{Array2, Zip};
 
-use crate::cores::{CORE_DEPTH, Cores};
+use crate::outlines::cores::{CORE_DEPTH, Cores};
 
 /// Depth of cores in standard deviations of the blur, where that is more.
 const CLEAR_OF_BLUR: f32 = 2.2;
+/// Standard deviation of the blur of a sharp photo, pixels.
+pub(crate) const SHARP: f32 = 0.8;
 /// Pixels that an outline may move out in one call.
 const REACH: u8 = 2;
 /// 1 / (2 √(2π)): what a unit of curvature times blur takes from half the contrast.

@@ -6,7 +6,7 @@ use std::io::{self, Cursor, Read, Seek, Write};
 
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-use crate::outline::{Outline, Ring};
+use crate::labels::outline::{Outline, Ring};
 
 /// First bytes of a region.
 pub(crate) const MAGIC: &[u8] = b"Iout";

@@ -3,12 +3,10 @@
 use ndarray::Array2;
 use stereology_imaging::{DisjointSets, connected_components, distance_transform, gaussian_filter};
 
-use crate::{
-    cores::{CORE_DEPTH, Cores},
-    hills::Hills,
-    kmeans::kmeans,
-    regions::neighbours4,
-};
+use crate::ground::kmeans::kmeans;
+use crate::labels::watershed::Basins;
+use crate::outlines::cores::{CORE_DEPTH, Cores};
+use crate::outlines::regions::neighbours4;
 
 /// Colour groups looked for inside the mask.
 const GROUPS: usize = 8;
@@ -257,18 +255,18 @@ pub(crate) fn shape_depth(parts: &Array2<u32>) -> Array2<f32> {
 /// See [`contrast_depth`].
 #[must_use]
 pub fn split_by_depth(parts: &Array2<u32>, depth: &Array2<f32>, rise: [f32; 2]) -> Array2<u32> {
-    hills_of(parts, depth).divided(rising(parts.dim(), rise))
+    basins_of(parts, depth).divided(required_rise(parts.dim(), rise))
 }
 
 /// Hills of the smoothed depth of parts. Walks up may start on the lines between parts, whose depth is 0 before smoothing.
-pub(crate) fn hills_of(parts: &Array2<u32>, depth: &Array2<f32>) -> Hills {
+pub(crate) fn basins_of(parts: &Array2<u32>, depth: &Array2<f32>) -> Basins {
     let mut depth = gaussian_filter(depth.mapv(|d| d.min(DEEPEST)).view(), 1.0);
     depth.zip_mut_with(parts, |d, &part| *d = if part == 0 { 0.0 } else { *d });
-    Hills::new(&depth, parts, |_| false)
+    Basins::new(&depth, parts, |_| false)
 }
 
 /// How far a hill must rise above its saddle, by the place and height of its top.
-pub(crate) fn rising(
+pub(crate) fn required_rise(
     (height, width): (usize, usize),
     [least, share]: [f32; 2],
 ) -> impl Fn([usize; 2], f32) -> f32 + Copy {

@@ -2,8 +2,7 @@
 
 use image::RgbImage;
 use ndarray::Array2;
-
-use crate::options::EdgeRule;
+use stereology_metrics::{BoundingBox, EdgeRule, SamplingWindow};
 
 /// The trace of one particle on the section. Lengths in pixels, colours sRGB / 255.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,47 +142,23 @@ impl<'a> Index<'a> {
     }
 }
 
-/// Gives every profile its weight; the area they belong to, and whether the frame had to be cut short because profiles reach over more than half the photo.
-///
-/// # Formula
-///
-/// ```text
-/// frame:            1 if the upper left corner of the bounding box lies in [1, W − w) × [1, H − h), w and h the largest extents + 1;  area (W − 1 − w)(H − 1 − h)
-/// Miles-Lantuéjoul: W H / ((W − 1 − wᵢ)(H − 1 − hᵢ)) if whole, else 0;                                                           area W H
-/// ```
-///
-/// The corner moves with its profile, so a profile of any size or shape is counted with the probability that a point falls in the frame.
+/// Gives every profile its weight; returns the area they belong to, and whether the frame of the associated point rule is limited because a profile extends over more than half the photo.
 pub(crate) fn weigh(profiles: &mut [Profile], (height, width): (usize, usize), rule: EdgeRule) -> (f64, bool) {
-    let photo = (width * height) as f64;
-    let extent = |p: &Profile, axis: usize| p.bounding_box[axis + 2] - p.bounding_box[axis];
-    match rule {
-        EdgeRule::All => {
-            profiles.iter_mut().for_each(|p| p.weight = 1.0);
-            (photo, false)
-        }
-        EdgeRule::MilesLantuejoul => {
-            for p in profiles {
-                let room = |full: usize, used: usize| full.saturating_sub(1 + used).max(1) as f64;
-                p.weight = if p.touches_edge {
-                    0.0
-                } else {
-                    photo / (room(width, extent(p, 0)) * room(height, extent(p, 1)))
-                };
+    let boxes: Vec<BoundingBox> = profiles
+        .iter()
+        .map(|p| {
+            let [left, top, right, bottom] = p.bounding_box.map(|side| side as f64);
+            BoundingBox {
+                left,
+                top,
+                right,
+                bottom,
             }
-            (photo, false)
-        }
-        EdgeRule::Frame => {
-            // Whatever starts inside the frame must end inside the photo: cut profiles have to start beyond it.
-            let whole = |axis: usize| profiles.iter().map(|p| extent(p, axis) + 1).max().unwrap_or(0);
-            let (w, h) = (whole(0), whole(1));
-            let cut_short = w > width / 2 || h > height / 2;
-            let (right, lower) = (width - w.min(width / 2), height - h.min(height / 2));
-            for p in profiles {
-                let [x, y, ..] = p.bounding_box;
-                let counts = !p.touches_edge && (1..right).contains(&x) && (1..lower).contains(&y);
-                p.weight = f64::from(u8::from(counts));
-            }
-            (((right - 1) * (lower - 1)) as f64, cut_short)
-        }
+        })
+        .collect();
+    let weights = SamplingWindow::pixels(width, height).weigh(&boxes, rule);
+    for (profile, weight) in profiles.iter_mut().zip(weights.weights) {
+        profile.weight = weight;
     }
+    (weights.area, weights.frame_limited)
 }

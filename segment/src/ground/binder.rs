@@ -3,10 +3,9 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
-use crate::{
-    kmeans::kmeans,
-    light::{Sample, Surface, TERMS, colour_at, fit_surface, identity, inverse_factor, place, sample, scatter},
-    tones::GUESSES,
+use crate::ground::kmeans::kmeans;
+use crate::ground::light::{
+    Sample, Surface, TERMS, colour_at, fit_surface, identity, inverse_factor, place, sample, scatter,
 };
 
 /// Robust fit of the binder's colour: a quadratic surface of light in each channel of encoded values, and the scatter around it.
@@ -31,6 +30,8 @@ pub struct BinderModel {
     spread: f64,
 }
 
+/// Colours from which a binder is sought.
+pub(crate) const GUESSES: usize = 8;
 /// Distance beyond which a pixel does not count as binder while fitting.
 const GATE: f64 = 3.0;
 /// Scatter that is small for a photo: at this, twice the pixels outweigh twice the scatter.

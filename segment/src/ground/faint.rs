@@ -3,11 +3,9 @@
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
 
-use crate::{
-    binder::{BinderModel, length},
-    refine::half_contrast,
-    regions::{hysteresis, neighbours8, open},
-};
+use crate::ground::binder::{BinderModel, length};
+use crate::outlines::half_contrast::half_contrast;
+use crate::outlines::regions::{hysteresis, neighbours8, open};
 
 /// Pixels in the side of a cell of the coarse picture.
 const CELL: usize = 2;

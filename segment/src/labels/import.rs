@@ -4,10 +4,12 @@ use image::RgbImage;
 use ndarray::Array2;
 use stereology_imaging::connected_components;
 
-use crate::{
-    error::SegmentError, finding::Finding, options::SegmentOptions, profile::distinct, regions::neighbours4,
-    segmentation::Segmentation,
-};
+use crate::error::SegmentError;
+use crate::labels::profile::distinct;
+use crate::options::SegmentOptions;
+use crate::outlines::regions::neighbours4;
+use crate::segmentation::Segmentation;
+use stereology_metrics::Finding;
 
 /// Pieces from which a map of one or two numbers is a mask.
 const MANY: u32 = 6;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use ndarray::Array2;
 use serde_json::{Value, json};
 
-use crate::outline::{Outline, Ring, fill_outlines, outlines};
+use crate::labels::outline::{Outline, Ring, fill_outlines, outlines};
 
 /// Outlines of the annotations of the picture whose size is (height, width): polygons, or masks coded in runs. Numbers are the annotations' ids if they differ, else from 1.
 pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec<Outline>, String> {

@@ -1,0 +1,106 @@
+//! The steps from a photograph to its profiles.
+
+use std::ops::ControlFlow;
+
+use image::RgbImage;
+use stereology_imaging::{gaussian_filter_rgb, lab_image};
+use stereology_metrics::{Finding, Progress};
+
+use crate::error::SegmentError;
+use crate::files::photo::{MOST_PIXELS, encoded_image, too_large};
+use crate::ground::seen::{Ground, Seen, chosen_binder};
+use crate::labels::flecks::remove_flecks;
+use crate::labels::split::{basins_of, fill_label_holes, required_rise, split_by_colour};
+use crate::options::{Holes, SegmentOptions};
+use crate::quality::{binder_finding, count_findings, counts_by_rise, counts_by_threshold};
+use crate::segmentation::Segmentation;
+
+/// Finds the profiles of particles in a photo of a section.
+///
+/// The steps, each a public function: [`encoded_image`] and [`gaussian_filter_rgb`]; [`BinderModel`](crate::BinderModel), whose colour and light are fitted robustly; [`hysteresis`](crate::hysteresis) of the
+/// distance to it, [`fill_holes`](crate::fill_holes), [`open`](crate::open); [`half_contrast`](crate::half_contrast); [`split_by_colour`], [`split_by_shape`](crate::split_by_shape); small profiles removed,
+/// profiles at the edges weighted, colours grouped into categories.
+///
+/// # Errors
+///
+/// A photo that is too small, too large or of one colour, an option out of range, no particles, or cancelled. A photo without a binder is not an error but the finding `no-binder`.
+///
+/// # Complexity
+///
+/// Nearly linear in pixels, but for the sorting of parts of different colours that touch; about 90 bytes per pixel.
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, sections 4.2 and 5.2.
+///
+/// # Examples
+///
+/// See the crate's first page.
+pub fn segment(
+    photo: &RgbImage,
+    options: &SegmentOptions,
+    progress: Progress<'_>,
+) -> Result<Segmentation, SegmentError> {
+    options.check()?;
+    check_photo(photo)?;
+    let report = |done| match progress(done) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(SegmentError::Cancelled),
+    };
+    report(0.0)?;
+    let colours = gaussian_filter_rgb(encoded_image(photo).view(), options.smoothing);
+    report(0.15)?;
+    let binder = chosen_binder(&colours, options)?;
+    report(0.3)?;
+    let mut seen = Seen::new(photo, &colours, binder, options);
+    let regions = seen.regions();
+    report(0.4)?;
+    let mask = seen.outlined(regions, &colours, options);
+    report(0.6)?;
+    let parts = split_by_colour(&lab_image(colours.view()), &mask, options.seed);
+    report(0.75)?;
+    let basins = basins_of(&parts, &seen.depth(&parts));
+    let mut labels = basins.divided(required_rise(parts.dim(), options.rise));
+    let by_rise = counts_by_rise(&basins, parts.dim(), options);
+    drop((basins, parts));
+    let [_, high] = seen.thresholds;
+    remove_flecks(&mut labels, &seen.distance, &seen.deviation, high, options.min_area);
+    if options.holes == Holes::Fill {
+        fill_label_holes(&mut labels);
+    }
+    report(0.9)?;
+    let mut out = Segmentation::measured(photo, labels, options);
+    if out.profiles.is_empty() {
+        return Err(SegmentError::NoParticles {
+            min_area: options.min_area,
+        });
+    }
+    let left_out = mask.indexed_iter().filter(|(p, m)| **m && out.labels[*p] == 0);
+    out.rejected = left_out.map(|((y, x), _)| [y, x]).collect();
+    out.renumber();
+    out.findings
+        .extend(binder_finding(seen.covered, seen.is_clear, out.area_fraction));
+    if matches!(seen.ground, Ground::Densest) {
+        out.findings.push(Finding::new("vague-binder", "binder and particle colours overlap: what differs clearly from the commonest colour is outlined, and particles of the binder's own colours are missed; look at the overlay, give the binder's colour, or import a label map"));
+    }
+    let by_threshold = counts_by_threshold(&seen.distance, &seen.deviation, seen.thresholds, options);
+    out.findings.extend(count_findings(by_threshold, by_rise));
+    report(1.0)?;
+    Ok(out)
+}
+
+/// Refuses photos without room for particles and a binder, with more pixels than labels can number, or of one colour.
+fn check_photo(photo: &RgbImage) -> Result<(), SegmentError> {
+    let (width, height) = photo.dimensions();
+    if width < 16 || height < 16 {
+        return Err(SegmentError::TooSmall { width, height });
+    }
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        return Err(too_large([width, height], MOST_PIXELS));
+    }
+    let first = *photo.get_pixel(0, 0);
+    if photo.pixels().all(|p| *p == first) {
+        return Err(SegmentError::SingleColour { colour: first.0 });
+    }
+    Ok(())
+}

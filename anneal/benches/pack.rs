@@ -1,6 +1,6 @@
-//! Packing and its certificate at the sizes the notes give targets for.
+//! Packing, its certificate and measures of its quality.
 
-#![expect(missing_docs, reason = "criterion's macro writes undocumented functions")]
+#![expect(missing_docs, reason = "criterion's macro generates undocumented functions")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -1,4 +1,4 @@
-//! Packs three hundred rings, hooks and jacks, which are not convex, and certifies them against their own meshes.
+//! Packs three hundred rings, hooks and jacks, which are not convex, and certifies that their meshes do not overlap.
 //!
 //! ```text
 //! cargo run --release -p stereology-anneal --example hollow_bodies
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A square bar bent to a U.
+/// A square bar bent into a U.
 fn hook() -> TriangleMesh {
     cells(&[
         [0, 0, 0],

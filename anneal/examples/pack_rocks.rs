@@ -1,4 +1,5 @@
-//! Packs a thousand rocks and spheres of lognormal sizes to a volume fraction of 0.45, certifies them and counts what a section shows.
+//! Packs a thousand rocks and spheres of lognormal sizes to a volume fraction of 0.45 and counts the profiles on a
+//! section.
 //!
 //! ```text
 //! cargo run --release -p stereology-anneal --example pack_rocks
@@ -46,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let side = packing.sides().x;
     println!(
-        "the section at mid height shows {profiles} profiles on an area fraction of {:.3}",
+        "the section at mid height has {profiles} profiles with an area fraction of {:.3}",
         area / (side * side)
     );
     Ok(())

@@ -1,4 +1,4 @@
-//! Simulated annealing proper: single moves by Metropolis' rule, at a temperature that falls.
+//! Simulated annealing: single moves accepted by the Metropolis rule at a falling temperature.
 //!
 //! # Formula
 //!
@@ -6,14 +6,15 @@
 //! E = Σ ½ δ²,   a move is accepted with probability min(1, exp(−ΔE / T)),   T from 2 10⁻² to 10⁻⁸ r̄² by one factor a sweep
 //! ```
 //!
-//! A sweep tries to shift and turn every particle once, by steps that are widened or narrowed so that 30 to 40 % are accepted at every temperature; a tenth of
-//! the moves trade the places of two particles of different size, and a twentieth take a particle that is pressed harder than the mean to a place drawn
-//! anywhere. What overlap is left is removed by a quench, the descent of [`Mode::Fast`](crate::Mode::Fast).
+//! A sweep attempts to shift and rotate every particle once. The step size is adapted so that 30 to 40 % of the moves
+//! are accepted at every temperature. A tenth of the moves swap the positions of two particles of different size, and a
+//! twentieth move a particle with more overlap energy than the mean to a random position. The remaining overlap is
+//! removed by a quench with the descent of [`Mode::Fast`](crate::Mode::Fast).
 //!
 //! # References
 //!
-//! Kirkpatrick, Gelatt & Vecchi 1983; Metropolis et al. 1953. Jagnow, Dorsey & Rushmeier 2004 (section 4.1) name simulated annealing, but describe a relaxation
-//! without temperature: that is [`Mode::Paper`](crate::Mode::Paper).
+//! Kirkpatrick, Gelatt & Vecchi 1983; Metropolis et al. 1953. Jagnow, Dorsey & Rushmeier 2004 (section 4.1) mention
+//! simulated annealing, but describe a relaxation without temperature, which is [`Mode::Paper`](crate::Mode::Paper).
 
 use crate::assembly::Assembly;
 use crate::damped::{self, End, Limits};
@@ -27,10 +28,10 @@ use stereology_shape::{PeriodicBox, isotropic_rotation};
 
 /// Sweeps from the first to the last temperature.
 const SWEEPS: usize = 200;
-/// Temperatures, in squares of the mean radius.
+/// First and last temperature, in units of the squared mean radius.
 const HOT: f64 = 2e-2;
 const COLD: f64 = 1e-8;
-/// Below this step, in mean radii, everything is held by its neighbours.
+/// Below this step, in mean radii, all particles are held by their neighbours.
 const FROZEN: f64 = 1e-4;
 const STREAM: u64 = 22;
 
@@ -78,14 +79,14 @@ struct Chain<'a, 'b> {
     period: PeriodicBox,
     /// Longest shift.
     step: f64,
-    /// Largest turn.
+    /// Largest rotation.
     angle: f64,
-    /// Mean energy of a particle in the sweep before.
+    /// Mean energy per particle in the previous sweep.
     per_particle: f64,
 }
 
 impl Chain<'_, '_> {
-    /// Tries every particle once; returns the energy.
+    /// Attempts to move every particle once; returns the energy.
     fn sweep(&mut self, temperature: f64, rng: &mut ChaCha8Rng) -> f64 {
         let count = self.bodies.assembly.len();
         let (mut tried, mut taken) = (0_usize, 0_usize);
@@ -120,7 +121,7 @@ impl Chain<'_, '_> {
         energy
     }
 
-    /// A shift and a turn; the energy of the particle if they are accepted.
+    /// Attempts a shift and a rotation; returns the energy of the particle if accepted.
     fn shift(&mut self, i: usize, before: f64, temperature: f64, rng: &mut ChaCha8Rng) -> Option<f64> {
         let (centre, rotation) = self.bodies.assembly.pose(i);
         let centre = centre + in_ball(rng) * self.step;
@@ -134,7 +135,7 @@ impl Chain<'_, '_> {
         self.attempt(i, centre, rotation, before, temperature, rng)
     }
 
-    /// A place drawn anywhere.
+    /// Attempts a random position and orientation.
     fn reinsert(&mut self, i: usize, before: f64, temperature: f64, rng: &mut ChaCha8Rng) -> Option<f64> {
         let centre = anywhere(rng, &self.period);
         let rotation = isotropic_rotation(rng);
@@ -162,7 +163,7 @@ impl Chain<'_, '_> {
         }
     }
 
-    /// Two particles of different size trade places.
+    /// Attempts to swap the positions of two particles of different size.
     fn swap(&mut self, i: usize, j: usize, before: f64, temperature: f64, rng: &mut ChaCha8Rng) -> Option<f64> {
         let (large, small) = (self.bodies.assembly.size(i), self.bodies.assembly.size(j));
         if i == j || (large / small).ln().abs() < 0.02 {
@@ -186,7 +187,7 @@ impl Chain<'_, '_> {
         None
     }
 
-    /// Energy of the overlaps of two particles with each other, which each counts as its own.
+    /// Energy of the overlaps between two particles, which the energy of each contains.
     fn shared(&self, i: usize, j: usize) -> f64 {
         let mut shared = 0.0;
         let _ = self.bodies.each_overlap(i, |other, overlap| {
@@ -199,6 +200,6 @@ impl Chain<'_, '_> {
     }
 }
 
-fn accepted(rise: f64, temperature: f64, rng: &mut ChaCha8Rng) -> bool {
-    rise <= 0.0 || rng.random::<f64>() < (-rise / temperature).exp()
+fn accepted(increase: f64, temperature: f64, rng: &mut ChaCha8Rng) -> bool {
+    increase <= 0.0 || rng.random::<f64>() < (-increase / temperature).exp()
 }

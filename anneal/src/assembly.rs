@@ -1,4 +1,4 @@
-//! The particles while they move: where they are, how they are turned, and what convex solids they consist of.
+//! The particles while they move: positions, orientations and the convex solids that they consist of.
 
 use crate::difference::{Posed, Solid};
 use crate::neighbours::Neighbours;
@@ -11,30 +11,31 @@ use stereology_shape::{BodyKind, Particle, PeriodicBox, UnitBody};
 #[derive(Clone, Debug)]
 pub(crate) struct Assembly<'a> {
     bodies: &'a [UnitBody],
-    /// What stands for each body.
+    /// Representation of each body.
     stand_ins: &'a [StandIn],
     particles: Vec<Particle>,
     sides: Vector3<f64>,
-    /// All bodies are spheres, or are taken for spheres of their volume: nothing rotates, and pairs take the closed form.
+    /// All bodies are spheres, or are treated as spheres of equal volume: nothing rotates, and pairs have a closed
+    /// form.
     pub(crate) round: bool,
-    /// Radius of the sphere of the same volume.
+    /// Radius of the sphere of equal volume.
     pub(crate) radius: Vec<f64>,
     /// Not wrapped while neighbours are valid.
     pub(crate) centre: Vec<Vector3<f64>>,
     rotation: Vec<UnitQuaternion<f64>>,
     matrix: Vec<Matrix3<f64>>,
-    /// From each particle's centre to the centres of its parts, in world axes, particle after particle.
+    /// Vectors from the centre of each particle to the centres of its parts, in world axes, particle by particle.
     arms: Vec<Vector3<f64>>,
     first_arm: Vec<usize>,
-    /// An upper bound of the way any point of a (slightly swollen) particle has gone; only if not round.
+    /// Upper bound of the distance that any point of the (slightly swollen) particle has moved; only if not round.
     pub(crate) travelled: Vec<f64>,
 }
 
-/// Bodies are never swollen more than this while they are packed.
+/// Largest swelling of bodies while they are packed.
 pub(crate) const SWELLING_MOST: f64 = 1.05;
 
 impl<'a> Assembly<'a> {
-    /// The particles of valid shapes and sizes, in the box.
+    /// `particles` have been checked.
     pub(crate) fn new(
         bodies: &'a [UnitBody],
         stand_ins: &'a [StandIn],
@@ -88,7 +89,7 @@ impl<'a> Assembly<'a> {
         self.centre.len()
     }
 
-    /// The particles where they are now, in the box.
+    /// The particles at their current positions, in the box.
     pub(crate) fn into_particles(self, period: &PeriodicBox) -> Vec<Particle> {
         let mut particles = self.particles;
         for (i, particle) in particles.iter_mut().enumerate() {
@@ -98,14 +99,15 @@ impl<'a> Assembly<'a> {
         particles
     }
 
-    /// Brings all centres into the box. Neighbours found before are void.
+    /// Brings all centres into the box. Invalidates neighbours found before.
     pub(crate) fn wrap(&mut self, period: &PeriodicBox) {
         for centre in &mut self.centre {
             *centre = period.wrap(&Point3::from(*centre)).coords;
         }
     }
 
-    /// Pairs that can overlap at sizes times `swelling` before anyone moves by half of `skin`. Centres are in the box.
+    /// Pairs that can overlap at sizes times `swelling` before any particle has moved by half of `skin`. Centres are in
+    /// the box.
     pub(crate) fn neighbours(&self, swelling: f64, skin: f64) -> Neighbours {
         let reach: Vec<f64> = (0..self.len()).map(|i| self.reach(i) * swelling).collect();
         Neighbours::find(&self.centre, &reach, self.sides, skin)
@@ -132,7 +134,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The convex solids a particle consists of: from its centre to theirs, and how far they reach about that.
+    /// The convex solids of a particle: vector from its centre to theirs, their radius about that, and the solid.
     pub(crate) fn solids(&self, i: usize) -> impl Iterator<Item = (Vector3<f64>, f64, Posed<'_>)> {
         let size = self.particles[i].size;
         let parts = self.parts(i);
@@ -149,12 +151,12 @@ impl<'a> Assembly<'a> {
         }))
     }
 
-    /// Whether some bodies have hollows that others can be caught in.
+    /// Whether some bodies have concavities in which others can be trapped.
     pub(crate) fn can_entangle(&self) -> bool {
         !self.round && self.stand_ins.iter().any(|stand_in| stand_in.parts.len() > 1)
     }
 
-    /// Whether a particle is one convex solid that stands for itself.
+    /// Whether a particle is a single convex solid.
     pub(crate) fn single(&self, i: usize) -> bool {
         self.parts(i).is_empty()
     }
@@ -163,12 +165,12 @@ impl<'a> Assembly<'a> {
         self.particles[i].size
     }
 
-    /// Where a particle is and how it is turned.
+    /// Position and orientation of a particle.
     pub(crate) fn pose(&self, i: usize) -> (Vector3<f64>, UnitQuaternion<f64>) {
         (self.centre[i], self.rotation[i])
     }
 
-    /// Puts a particle somewhere else.
+    /// Sets position and orientation of a particle.
     pub(crate) fn set_pose(&mut self, i: usize, (centre, rotation): (Vector3<f64>, UnitQuaternion<f64>)) {
         self.centre[i] = centre;
         if !self.round && rotation != self.rotation[i] {
@@ -184,7 +186,7 @@ impl<'a> Assembly<'a> {
         self.travelled[i] += way.norm();
     }
 
-    /// Turns a particle by a rotation vector.
+    /// Rotates a particle by a rotation vector.
     pub(crate) fn turn(&mut self, i: usize, angle: &Vector3<f64>) {
         let mut rotation = UnitQuaternion::from_scaled_axis(*angle) * self.rotation[i];
         rotation.renormalize();

@@ -1,4 +1,4 @@
-//! The certificate: proof, pair by pair, that no two particles share a point of their insides.
+//! The certificate: a proof, pair by pair, that no two particles share an interior point.
 
 use crate::difference::Posed;
 use crate::gauge::{Gauge, Search};
@@ -11,23 +11,24 @@ use std::fmt;
 use std::ops::Deref;
 use stereology_shape::{Arrangement, Particle, UnitBody};
 
-/// An [`Arrangement`] of which it is proved that no particles overlap, at their true sizes.
+/// An [`Arrangement`] in which no particles overlap at their true sizes, as proved by [`Packing::verify`].
 ///
-/// Only [`Packing::verify`] makes one, directly or at the end of [`pack`](crate::pack). Positions are in the box. It dereferences to its arrangement;
-/// [`Packing::certificate`] summarises the proof.
+/// Only [`Packing::verify`] creates one, directly or at the end of [`pack`](crate::pack). Positions are in the box. It
+/// dereferences to its arrangement; [`Packing::certificate`] summarises the proof.
 ///
 /// # Method
 ///
-/// Every pair of particles and of their periodic images, a particle's own images too, whose bounding spheres meet must show a witness: spheres their
-/// distance, convex bodies a direction `n` in which they lie apart,
+/// Every pair of particles whose bounding spheres overlap, including all periodic images and a particle and its own
+/// images, needs a witness: spheres their distance, convex bodies a direction `n` in which they are separate,
 ///
 /// ```text
-/// h_A(n) + h_B(−n) ≤ n·(c_B − c_A)        h: how far the body reaches from its centroid c in a direction
+/// h_A(n) + h_B(−n) ≤ n·(c_B − c_A)        h: support function about the centroid c
 /// ```
 ///
-/// However the direction was found, the inequality proves the pair apart. Nothing is moved. Touching is no overlap; an allowance of 10⁻¹² of the reach
-/// stands for the rounding of coordinates. Bodies that are not convex, if not even their hulls meet, are apart likewise; else all faces of the two meshes (as
-/// given, not parts or proxies of them) must show such a direction pair by pair, and no piece of either surface may lie inside the other.
+/// The inequality proves the pair separate, however the direction was found. Nothing is moved. Touching is not an
+/// overlap; a tolerance of 10⁻¹² of the reach allows for the rounding of coordinates. Bodies that are not convex are
+/// separate if their hulls are; otherwise all pairs of faces of the two meshes (as given, not parts or proxies of them)
+/// need such a direction, and no connected component of either surface may lie inside the other body.
 #[derive(Clone, Debug)]
 pub struct Packing {
     arrangement: Arrangement,
@@ -36,16 +37,17 @@ pub struct Packing {
     iterations: usize,
 }
 
-/// Two particles that could not be shown apart.
+/// Two particles that could not be proved separate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Overlap {
-    /// Index of the particle that comes first.
+    /// The smaller index.
     pub first: usize,
-    /// Index of the other, which comes later; equal to `first` if a particle meets its own periodic image.
+    /// The larger index; equal to `first` if a particle overlaps its own periodic image.
     pub second: usize,
-    /// How far one must be moved to part them, along the direction in which they would part first if they shrank, or across a face of either: exact for spheres
-    /// and for boxes that are aligned, else an upper bound; for bodies that are not convex the depth of the deepest crossing face or enclosed point. A length.
+    /// Distance by which one must be moved to separate them, along the direction in which they would separate first if
+    /// they shrank, or along a face normal of either: exact for spheres and for aligned boxes, otherwise an upper
+    /// bound. For bodies that are not convex, the depth of the deepest crossing face or enclosed point. A length.
     pub depth: f64,
 }
 
@@ -53,9 +55,9 @@ pub struct Overlap {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub struct Overlaps {
-    /// The pairs, deepest first; a pair that meets in several periodic images is there several times.
+    /// The pairs, deepest first; a pair that overlaps in several periodic images occurs several times.
     pub pairs: Vec<Overlap>,
-    /// The deepest overlap over the mean size of all particles.
+    /// The deepest overlap divided by the mean size of all particles.
     pub max_overlap: f64,
 }
 
@@ -74,14 +76,14 @@ impl fmt::Display for Overlaps {
     }
 }
 
-/// What the proof of a packing examined.
+/// Summary of the proof of a packing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// Pairs of particles and periodic images whose bounding spheres meet; each was shown apart.
+    /// Number of pairs of particles and periodic images whose bounding spheres overlap; each was proved separate.
     pub pairs: usize,
-    /// Lower bound of the least distance between the surfaces of such a pair, a length: 0 if particles touch or two bodies that are not convex interlock;
-    /// infinite without pairs.
+    /// Lower bound of the smallest distance between the surfaces of such a pair, a length: 0 if particles touch or two
+    /// bodies that are not convex interlock; infinite without pairs.
     pub least_gap: f64,
 }
 
@@ -96,7 +98,7 @@ impl Deref for Packing {
 impl Packing {
     /// Proves that no particles overlap.
     ///
-    /// Cost: N log N for the pairs, microseconds a pair.
+    /// Cost: N log N for finding the pairs, microseconds per pair.
     ///
     /// # Errors
     ///
@@ -147,25 +149,26 @@ impl Packing {
         self
     }
 
-    /// The particles and their box, without the proof.
+    /// The particles and their box, without the certificate.
     #[must_use]
     pub fn arrangement(&self) -> &Arrangement {
         &self.arrangement
     }
 
-    /// What the proof examined, and how near it came to failing.
+    /// Number of pairs that the proof examined, and the smallest gap.
     #[must_use]
     pub fn certificate(&self) -> &Certificate {
         &self.certificate
     }
 
-    /// The deepest overlap over the mean size: 0, by the certificate.
+    /// The deepest overlap divided by the mean size: 0, by the certificate.
     #[must_use]
     pub fn max_overlap(&self) -> f64 {
         0.0
     }
 
-    /// How often overlaps were found and relaxed to get here, or places tried if sequentially; 0 if the packing was only verified.
+    /// Number of iterations of the relaxation, or of positions tried in [`Mode::Sequential`](crate::Mode::Sequential);
+    /// 0 if the packing was only verified.
     #[must_use]
     pub fn iterations(&self) -> usize {
         self.iterations
@@ -173,14 +176,14 @@ impl Packing {
 
     /// Energy of the overlaps at each iteration, Σ ½ depth² over pairs of slightly swollen particles; length².
     ///
-    /// Of bodies that are not spheres the first part, up to a hundred values, is that of spheres of their volumes.
+    /// For bodies that are not spheres, up to a hundred values at the beginning are those of spheres of equal volume.
     #[must_use]
     pub fn energies(&self) -> &[f64] {
         &self.energies
     }
 }
 
-/// All pairs of particles that cannot be shown apart, deepest first: what [`Packing::verify`] finds.
+/// All pairs of particles that cannot be proved separate, deepest first, as [`Packing::verify`] finds them.
 ///
 /// # Examples
 ///
@@ -188,7 +191,7 @@ impl Packing {
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 ///
-/// // A sphere of diameter 1 in a box of side 0.8 meets its six nearest images: three pairs.
+/// // A sphere of diameter 1 in a box of side 0.8 overlaps its six nearest images: three pairs.
 /// let ball = UnitBody::new(&Body::sphere(1.0)?);
 /// let only = Particle { shape: 0, size: 1.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
 /// let found = stereology_anneal::overlaps(&Arrangement::new([ball], [only], PeriodicBox::new(Vector3::repeat(0.8))?)?);
@@ -201,7 +204,7 @@ pub fn overlaps(arrangement: &Arrangement) -> Vec<Overlap> {
     examine(arrangement).pairs
 }
 
-/// The overlapping pairs of an arrangement, deepest first, and what was examined of the others.
+/// The overlapping pairs of an arrangement, deepest first, and the summary of the other pairs.
 struct Examined {
     pairs: Vec<Overlap>,
     certificate: Certificate,
@@ -239,7 +242,7 @@ fn examine(arrangement: &Arrangement) -> Examined {
         .map(|p| p.orientation.to_rotation_matrix().into_inner())
         .collect();
     let surfaces: Vec<Option<Surface>> = surfaces_needed(bodies, particles);
-    // The skin makes up for the rounding of the reach.
+    // The skin allows for the rounding of the reach.
     let skin = 1e-9 * reach.iter().copied().fold(0.0, f64::max);
     let neighbours = Neighbours::find(&centres, &reach, period.sides(), skin);
     let placed = |i: usize| Placed {
@@ -279,10 +282,10 @@ fn examine(arrangement: &Arrangement) -> Examined {
     found
 }
 
-/// Allowance for the rounding of coordinates and support points.
+/// Relative tolerance for the rounding of coordinates and support points.
 const ROUNDING: f64 = 1e-12;
 
-/// The surfaces of meshes that meet, or are, bodies that are not convex.
+/// The surfaces of all meshes if any body is not convex.
 fn surfaces_needed(bodies: &[UnitBody], particles: &[Particle]) -> Vec<Option<Surface>> {
     let hollow = particles.iter().any(|p| !bodies[p.shape].is_convex());
     bodies
@@ -291,11 +294,11 @@ fn surfaces_needed(bodies: &[UnitBody], particles: &[Particle]) -> Vec<Option<Su
         .collect()
 }
 
-/// How two bodies lie to each other.
+/// Whether two bodies overlap.
 enum Separation {
-    /// A witness shows them apart, by at least this length.
+    /// A witness proves them separate by at least this length.
     Apart { gap: f64 },
-    /// No witness was found; how deep they overlap.
+    /// No witness was found; depth of the overlap.
     Overlap { depth: f64 },
 }
 
@@ -325,7 +328,7 @@ fn separation(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> Separati
         return Separation::Apart { gap };
     }
     if !convex {
-        // Hulls that meet prove nothing.
+        // Overlapping hulls prove nothing.
         let depth = surfaces::depth(a, b, offset);
         return if depth > 0.0 {
             Separation::Overlap { depth }
@@ -337,7 +340,7 @@ fn separation(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> Separati
     if gauge.at_most >= 1.0 - 1e-9
         && let Some((quotient, axis)) = best_axis(&hull_a, &hull_b, offset)
     {
-        // The search ended on a degenerate portal, or too near to touching to tell.
+        // The search ended on a degenerate portal, or too close to touching to decide.
         if let Some(gap) = witnessed(&hull_a, &hull_b, offset, &axis) {
             return Separation::Apart { gap };
         }
@@ -350,7 +353,8 @@ fn separation(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> Separati
     Separation::Overlap { depth }
 }
 
-/// How far the bodies lie apart in a direction at least, `None` if they do not; computed from their support points in world axes and nothing else.
+/// Lower bound of the gap between the bodies from one direction, `None` if it does not separate them. Computed only
+/// from their support points in world axes.
 fn witnessed(a: &Posed<'_>, b: &Posed<'_>, offset: &Vector3<f64>, normal: &Vector3<f64>) -> Option<f64> {
     if *normal == Vector3::zeros() {
         return None;

@@ -1,4 +1,4 @@
-//! The overlaps of particles, their energy and the forces that part them.
+//! The overlaps of particles, their energy and the forces that separate them.
 //!
 //! # Formula
 //!
@@ -6,10 +6,12 @@
 //! E = Σ over pairs ½ δ²,    δ = (1 + ε − γ) w   where γ < 1 + ε
 //! ```
 //!
-//! `γ` is the gauge of the pair and `w` the width of the difference body along the direction found, so `δ` is the depth of the overlap of the swollen bodies
-//! in that direction, for spheres `swollen radii − distance`. The force is `δ` along that direction, at the point where the shrunken bodies meet: a contact
-//! has stiffness 1 whatever the shapes. (Depth relative to the size of a particle instead makes flat contacts of rods stiffer than their ends; a thousand
-//! iterations against eighty.) Where bodies stand for themselves by convex parts, pairs are pairs of parts. Unit of energy: length².
+//! `γ` is the gauge of the pair and `w` the width of the difference body along the direction found, so `δ` is the depth
+//! of the overlap of the swollen bodies in that direction; for spheres `swollen radii − distance`. The force is `δ`
+//! along that direction, at the contact point of the shrunken bodies: every contact has stiffness 1. (With depth
+//! relative to the size of a particle, flat contacts of rods are stiffer than contacts at their ends, and packing takes
+//! a thousand iterations instead of eighty.) For bodies represented by convex parts, pairs are pairs of parts. Unit of
+//! energy: length².
 
 use crate::assembly::Assembly;
 use crate::conversions::compact;
@@ -18,7 +20,8 @@ use crate::neighbours::{Neighbour, Neighbours};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// One overlap: pushes `b` by `force` at `on_b` and `a` by the opposite at `on_a` (from the centroids).
+/// One overlap: it pushes `b` by `force` at `on_b`, and `a` by the opposite force at `on_a` (relative to the
+/// centroids).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Push {
     pub(crate) a: u32,
@@ -28,7 +31,7 @@ pub(crate) struct Push {
     pub(crate) on_b: Vector3<f64>,
 }
 
-/// The overlaps of one state, in blocks of fixed order.
+/// The overlaps of one arrangement, in blocks of fixed order.
 #[derive(Debug, Default)]
 pub(crate) struct Overlaps {
     blocks: Vec<Block>,
@@ -45,7 +48,7 @@ struct Block {
 }
 
 impl Block {
-    /// Adds the overlap of a pair, or of two parts of it that lie `arms` from the centres.
+    /// Adds the overlap of a pair, or of two parts of it at `arms` from the centres.
     fn overlap(&mut self, [a, b]: [usize; 2], swelling: f64, gauge: &Gauge, arms: [Vector3<f64>; 2]) {
         let depth = (swelling - gauge.value) * gauge.width;
         self.energy += 0.5 * depth * depth;
@@ -66,18 +69,18 @@ impl Block {
 }
 
 impl Overlaps {
-    /// All pushes, always in the same order.
+    /// All overlaps, always in the same order.
     pub(crate) fn pushes(&self) -> impl Iterator<Item = &Push> {
         self.blocks.iter().flat_map(|block| &block.pushes)
     }
 }
 
-/// What is remembered of a pair while it stays in the list.
+/// State of a pair while it stays in the list.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Memory {
-    /// The last direction that parted it, or came nearest to; zero if none yet.
+    /// The last direction that separated the pair, or came closest to it; zero if none yet.
     normal: Vector3<f64>,
-    /// Until both have travelled so far together they cannot meet.
+    /// The pair cannot overlap before the distances that both have moved sum to this.
     safe_until: f64,
 }
 
@@ -88,17 +91,17 @@ impl Memory {
     };
 }
 
-/// Bodies in one block of work; fixed, so that sums do not depend on threads.
+/// Bodies per block; fixed, so that sums do not depend on the number of threads.
 const BLOCK: usize = 256;
 
-/// Below this many bodies a second thread costs more than it saves.
+/// Below this number of bodies a second thread costs more than it saves.
 const ALONE: usize = 2 * BLOCK;
 
-/// Told of a pair of solids: from the centres of their particles to theirs, and their gauge.
+/// Visitor of a pair of solids: vectors from the centres of the particles to those of the solids, and their gauge.
 type Contact<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>, &Gauge) + 'a;
 
 impl Assembly<'_> {
-    /// Energy of one pair, `b` displaced by `shift`, at sizes times `swelling`; 0 if it is proved apart.
+    /// Energy of one pair, with `b` displaced by `shift`, at sizes times `swelling`; 0 if it is proved separate.
     pub(crate) fn pair_energy(&self, a: usize, b: usize, shift: &Vector3<f64>, swelling: f64) -> f64 {
         let offset = self.centre[b] + shift - self.centre[a];
         let squared = offset.norm_squared();
@@ -119,7 +122,10 @@ impl Assembly<'_> {
         energy
     }
 
-    /// Searches all pairs of solids of two particles whose bounding spheres meet, until `enough` is proved. Returns how far they must come before others do.
+    /// Searches all pairs of solids of two particles whose bounding spheres overlap, until the quotient reaches
+    /// `enough`.
+    ///
+    /// Returns the least gap between bounding spheres that do not overlap.
     fn each_contact(
         &self,
         a: usize,
@@ -289,7 +295,7 @@ impl Assembly<'_> {
             }
         }
         let search = Search {
-            enough: swelling + PARTED,
+            enough: swelling + PROVED_GAP,
             precision: 1e-4,
             steps: 24,
         };
@@ -320,14 +326,21 @@ impl Assembly<'_> {
             return;
         }
         let (mut safe, mut apart) = (f64::INFINITY, true);
-        let spheres = self.each_contact(a, b, offset, swelling, swelling + PARTED, &mut |arm_a, arm_b, gauge| {
-            if gauge.value >= swelling {
-                safe = safe.min((gauge.value - swelling) * gauge.width);
-                return;
-            }
-            apart = false;
-            block.overlap([a, b], swelling, gauge, [*arm_a, *arm_b]);
-        });
+        let spheres = self.each_contact(
+            a,
+            b,
+            offset,
+            swelling,
+            swelling + PROVED_GAP,
+            &mut |arm_a, arm_b, gauge| {
+                if gauge.value >= swelling {
+                    safe = safe.min((gauge.value - swelling) * gauge.width);
+                    return;
+                }
+                apart = false;
+                block.overlap([a, b], swelling, gauge, [*arm_a, *arm_b]);
+            },
+        );
         memory.safe_until = if apart {
             travelled + safe.min(spheres)
         } else {
@@ -336,10 +349,11 @@ impl Assembly<'_> {
     }
 }
 
-/// A search goes on past the first proof of separation until it has proved this much more room, so that the pair need not be asked again soon.
-const PARTED: f64 = 0.05;
+/// A search continues past the first proof of separation until it has proved this relative gap, so that the pair need
+/// not be searched again soon.
+const PROVED_GAP: f64 = 0.05;
 
-/// Where centres coincide: some direction, the same every time.
+/// A direction for coinciding centres, the same every time.
 fn arbitrary(a: usize, b: usize) -> Vector3<f64> {
     let angle = (a as f64 * 0.618 + b as f64 * 0.414).fract() * std::f64::consts::TAU;
     let height = ((a as f64 * 0.755 + b as f64 * 0.57).fract() * 2.0 - 1.0) * 0.99;

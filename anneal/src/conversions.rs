@@ -1,7 +1,8 @@
 //! Conversions between kinds of numbers, each with its bound.
 
 /// Index of a particle, image or cell in compact form. At most 10⁸ particles are accepted
-/// ([`ParticleError::TooMany`](crate::ParticleError::TooMany)); images and cells are held in memory and fewer than 2³².
+/// ([`ArrangementError::TooMany`](stereology_shape::ArrangementError::TooMany)); images and cells are held in memory
+/// and fewer than 2³².
 #[allow(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each")]
 pub(crate) fn compact(index: usize) -> u32 {
     index as u32

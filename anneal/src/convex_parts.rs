@@ -1,17 +1,20 @@
-//! Bodies that are not convex, as convex parts.
+//! Decomposition of bodies that are not convex into convex parts.
 //!
-//! A box about the body is halved again and again, each time where the hulls of what lies in the halves are smallest together, until all hulls together exceed
-//! the body's volume by no more than a tolerance. What lies in a box needs no capping of cut surfaces to have its hull found: an extreme point of it is a corner
-//! of a triangle clipped to the box, or a corner of the box inside the body. Each hull stays in its own box, so the hulls do not overlap and their volumes add
-//! up; together they cover the body, so what parts them parts the bodies.
+//! The bounding box of the body is cut in two repeatedly, each time where the hulls of the contents of both halves have
+//! the smallest total volume, until the hulls exceed the volume of the body by no more than a tolerance. The hull of
+//! the contents of a box does not require the cut surfaces to be capped: its extreme points are corners of triangles
+//! clipped to the box, or corners of the box inside the body. Each hull lies in its own box, so the hulls do not
+//! overlap and their volumes add up. Together they cover the body, so a direction that separates the hulls separates
+//! the bodies.
 //!
-//! Rejected: decomposition of voxels (V-HACD, Mamou 2016), whose stairs make parts larger than the body: 19 parts for what 8 exact ones do here.
+//! Rejected: decomposition of voxels (V-HACD, Mamou 2016), whose stair steps make parts larger than the body: 19 parts
+//! instead of 8.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{ClosedMesh, TriangleMesh, UnitBody, convex_hull};
 
-/// Convex bodies that cover a body and exceed its volume by little, in unit coordinates.
+/// Convex bodies that cover a body and slightly exceed its volume, in unit coordinates.
 ///
 /// # Examples
 ///
@@ -32,19 +35,20 @@ pub struct ConvexParts {
     excess: f64,
 }
 
-/// No body is cut into more parts.
+/// Maximum number of parts.
 const MOST: usize = 128;
 /// Planes tried along each axis of a part.
 const PLANES: usize = 7;
-/// Relative to a box: nothing that thin matters.
-const HAIR: f64 = 1e-6;
-/// A cut that saves less of a hull than this is no better than halving.
-const WORTHWHILE: f64 = 1e-3;
+/// Lengths below this fraction of a box are negligible.
+const NEGLIGIBLE: f64 = 1e-6;
+/// A cut that saves less than this fraction of a hull is no better than halving.
+const LEAST_SAVING: f64 = 1e-3;
 
 impl ConvexParts {
-    /// Cuts a body until its parts exceed its volume by no more than `tolerance` of it, or are 128.
+    /// Cuts a body until its parts exceed its volume by a fraction of no more than `tolerance`, or there are 128 parts.
     ///
-    /// Convex bodies are one part, their own hull; spheres and ellipsoids have no mesh and so no parts. Cost: T log T for each of about 40 cuts a part tries.
+    /// A convex mesh has one part, its own hull; spheres and ellipsoids have no mesh and so no parts. Cost: T log T for
+    /// each of the about 40 cuts tried per part.
     #[must_use]
     pub fn of(body: &UnitBody, tolerance: f64) -> Self {
         let Some(mesh) = body.mesh() else {
@@ -63,7 +67,7 @@ impl ConvexParts {
         let mut pieces = vec![whole];
         let total = |pieces: &[Piece]| pieces.iter().map(|p| p.hull.volume()).sum::<f64>();
         while total(&pieces) > (1.0 + tolerance) * volume && pieces.len() < MOST {
-            // The part that holds most of what is too much.
+            // The part with the largest excess volume.
             let Some(worst) = (0..pieces.len())
                 .filter(|&i| !pieces[i].final_form)
                 .max_by(|&i, &j| pieces[i].excess().total_cmp(&pieces[j].excess()).then(j.cmp(&i)))
@@ -89,7 +93,7 @@ impl ConvexParts {
         &self.hulls
     }
 
-    /// Volume of the parts together over that of the body, less one.
+    /// Total volume of the parts divided by that of the body, minus one.
     #[must_use]
     pub fn excess(&self) -> f64 {
         self.excess
@@ -103,16 +107,16 @@ enum Half {
     Flat,
 }
 
-/// What lies of a body in one box.
+/// The contents of one box.
 struct Piece {
     low: Point3<f64>,
     high: Point3<f64>,
-    /// Its surface in the box.
+    /// Surface of the body in the box.
     polygons: Vec<Vec<Point3<f64>>>,
     hull: ClosedMesh,
-    /// Volume of the body in the box, by counting points.
+    /// Volume of the body in the box, estimated by counting points.
     filled: Option<f64>,
-    /// It cannot be cut.
+    /// No further cut is possible.
     final_form: bool,
 }
 
@@ -135,12 +139,12 @@ impl Piece {
         })
     }
 
-    /// How much larger than its contents its hull is, roughly.
+    /// Approximate excess of the hull over its contents, in volume.
     fn excess(&self) -> f64 {
         self.hull.volume() - self.filled.unwrap_or(0.0)
     }
 
-    /// The best cut in two (or one, if a half is empty); none if there is no better than none.
+    /// The halves of the best cut (one, if the other is empty); none if no cut is possible.
     fn halved(&self, body: &UnitBody) -> Vec<Self> {
         let extent = |axis: usize| {
             let along = self.hull.vertices().iter().map(|v| v[axis]);
@@ -157,7 +161,7 @@ impl Piece {
                     match self.half(body, axis, at, above) {
                         Half::Filled(half) => halves.push(*half),
                         Half::Empty => {}
-                        // What is left of a cut that cannot be measured must not be lost.
+                        // A flat half has no hull but must not be lost: reject the cut.
                         Half::Flat => return (f64::INFINITY, Vec::new()),
                     }
                 }
@@ -170,7 +174,7 @@ impl Piece {
         let Some(&middle) = along.get(along.len() / 2) else {
             return Vec::new();
         };
-        let (mut chosen, mut least) = (middle, (1.0 - WORTHWHILE) * self.hull.volume());
+        let (mut chosen, mut least) = (middle, (1.0 - LEAST_SAVING) * self.hull.volume());
         for (number, (volume, _)) in tried.iter().enumerate() {
             if *volume < least * (1.0 - 1e-9) {
                 (chosen, least) = (number, *volume);
@@ -187,13 +191,14 @@ impl Piece {
         halves
     }
 
-    /// Where to try a cut across an axis: through the corners of the surface if they lie in few planes (edges of blocks), else evenly.
+    /// Positions of cuts perpendicular to an axis: the corners of the surface if they lie in few planes (edges of
+    /// blocks), otherwise evenly spaced.
     fn planes(&self, axis: usize, (from, to): (f64, f64)) -> Vec<f64> {
-        let hair = HAIR * (to - from);
+        let negligible = NEGLIGIBLE * (to - from);
         let mut corners: Vec<f64> = self.polygons.iter().flatten().map(|p| p[axis]).collect();
-        corners.retain(|x| from + hair < *x && *x < to - hair);
+        corners.retain(|x| from + negligible < *x && *x < to - negligible);
         corners.sort_by(f64::total_cmp);
-        corners.dedup_by(|x, y| (*x - *y).abs() <= hair);
+        corners.dedup_by(|x, y| (*x - *y).abs() <= negligible);
         if (1..=2 * PLANES).contains(&corners.len()) {
             return corners;
         }
@@ -202,7 +207,7 @@ impl Piece {
             .collect()
     }
 
-    /// The part on one side of a plane across an axis.
+    /// The part on one side of a plane perpendicular to an axis.
     fn half(&self, body: &UnitBody, axis: usize, at: f64, above: bool) -> Half {
         let (mut low, mut high) = (self.low, self.high);
         if above {
@@ -217,9 +222,9 @@ impl Piece {
             .filter(|polygon| polygon.len() > 2)
             .collect();
         let mut points: Vec<Point3<f64>> = polygons.iter().flatten().copied().collect();
-        // A hair inside the box: a corner may lie on the surface of a body that fills the box about it.
+        // Test slightly inside the box: a corner may lie on the surface of a body that fills the box around it.
         let middle = nalgebra::center(&low, &high);
-        points.extend(corners(&low, &high).filter(|corner| body.contains(&(corner + (middle - corner) * HAIR))));
+        points.extend(corners(&low, &high).filter(|corner| body.contains(&(corner + (middle - corner) * NEGLIGIBLE))));
         points.sort_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)));
         points.dedup();
         if points.is_empty() {
@@ -238,7 +243,7 @@ impl Piece {
         }))
     }
 
-    /// Volume of the body in the hull's box, from a grid of points.
+    /// Volume of the body in the bounding box of the hull, from a grid of points.
     fn count(&self, body: &UnitBody) -> f64 {
         const POINTS: usize = 16;
         let corner = self.hull.vertices()[0];
@@ -267,10 +272,10 @@ fn corners(low: &Point3<f64>, high: &Point3<f64>) -> impl Iterator<Item = Point3
     })
 }
 
-/// What of a convex polygon lies on one side of a plane across an axis (Sutherland & Hodgman 1974).
+/// The part of a convex polygon on one side of a plane perpendicular to an axis (Sutherland & Hodgman 1974).
 fn clipped(polygon: &[Point3<f64>], axis: usize, at: f64, above: bool) -> Vec<Point3<f64>> {
     let height = |p: &Point3<f64>| if above { p[axis] - at } else { at - p[axis] };
-    // What only touches the plane bounds the other half.
+    // A polygon that only touches the plane belongs to the other half.
     if polygon.iter().all(|p| height(p) <= 0.0) {
         return Vec::new();
     }
@@ -298,7 +303,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use stereology_shape::{Body, ClosedMesh, TriangleMesh, UnitBody};
 
-    /// Every point of the body is in a part, and few points of parts are not in the body.
+    /// Every point of the body lies in a part, and the parts exceed the body by little.
     #[test]
     fn parts_cover_the_body() {
         let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 24, 12)).unwrap();
@@ -312,7 +317,7 @@ mod tests {
         let outside = |hull: &ClosedMesh, p: &Point3<f64>| {
             let heights = hull.triangles().iter().filter_map(|t| {
                 let [a, b, c] = t.map(|v| hull.vertices()[v as usize]);
-                // Slivers have no direction.
+                // Degenerate triangles have no normal.
                 let normal = (b - a).cross(&(c - a)).try_normalize(1e-12)?;
                 Some(normal.dot(&(p - a)))
             });

@@ -1,4 +1,4 @@
-//! The fast way: particles pushed apart by their overlaps, with inertia and friction.
+//! The fast mode: overlaps push particles apart, with inertia and friction.
 //!
 //! # Formula
 //!
@@ -6,9 +6,11 @@
 //! v ← μ v + Δt F / m,     x ← x + Δt v,      μ = .9 … .98,  Δt = .6 in units in which a contact has stiffness 1 and the lightest particle mass 1
 //! ```
 //!
-//! and the same for rotations: gradient descent with momentum (Polyak 1964). Compared with FIRE (Bitzek et al. 2006), which stops all particles whenever
-//! the whole runs uphill, it needs less than half the iterations for spheres (lognormal σ .3, 10,000 at .64: 185-400 against 581), and does not stall on
-//! flat faces: their energy has creases, on which a few rattling cubes stop everybody for ever (500 cubes at .6: 75 iterations; FIRE did not end in 2,000).
+//! and likewise for rotations: gradient descent with momentum (Polyak 1964). FIRE (Bitzek et al. 2006) stops all
+//! particles whenever the total energy rises. Compared with it, this method needs less than half the iterations for
+//! spheres (lognormal σ .3, 10,000 at .64: 185-400 against 581), and does not stall on flat faces: their energy has
+//! creases, on which a few rattling cubes stop all particles repeatedly (500 cubes at .6: 75 iterations; FIRE did not
+//! end in 2,000).
 
 use crate::assembly::Assembly;
 use crate::contacts::{Memory, Overlaps};
@@ -28,32 +30,34 @@ pub(crate) enum End {
     Cancelled,
 }
 
-/// What a relaxation may do.
+/// Limits of a relaxation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Sizes are multiplied by this while relaxing: what is apart at true size is then reached in finite time.
+    /// Sizes are multiplied by this while relaxing, so that overlaps at true size vanish in a finite number of
+    /// iterations.
     pub(crate) swelling: f64,
     pub(crate) iterations: usize,
     pub(crate) seed: u64,
 }
 
-/// Pairs count as apart when they are so by a little more than rounding.
+/// Pairs count as separate if their gap exceeds rounding errors.
 pub(crate) const APART: f64 = -1e-9;
 
-/// Longest step that is stable for a particle of twelve contacts, of stiffness 1 each (measured: .8 diverges for cubes).
+/// Longest stable time step for a particle with twelve contacts of stiffness 1 (measured: .8 diverges for cubes).
 const STEP: f64 = 0.6;
 const SHORTEST_STEP: f64 = 0.15;
-/// Nobody moves further in a step than this part of its radius or of the mean radius, or turns by more than this angle. A grain of dust under a boulder has
-/// far to go.
+/// In one step no particle moves by more than this fraction of its radius or of the mean radius, whichever is larger,
+/// or rotates by more than this angle. The mean radius counts because a small particle inside a large one has far to
+/// go.
 const STRIDE: f64 = 0.2;
-/// Progress is judged after so many iterations.
+/// Progress is checked after so many iterations.
 const WATCH: usize = 100;
-/// How often particles that no longer yield are shaken.
+/// Maximum number of random perturbations of all particles.
 const SHAKES: u64 = 3;
-/// How often entangled particles are taken elsewhere.
+/// Maximum number of times that entangled particles are moved elsewhere.
 const RESCUES: u64 = 30;
 const RESCUE_STREAM: u64 = 1 << 20;
-/// An overlap of this part of a pair's width that does not yield.
+/// An overlap of this fraction of the width of a pair that no longer decreases shows that there is no room.
 const HOPELESS: f64 = 0.03;
 
 /// Relaxes until no pair overlaps at true size. Energies are appended to `trace`.
@@ -82,7 +86,8 @@ pub(crate) fn relax(
             return End::Cancelled;
         }
         if iteration % WATCH == WATCH - 1 {
-            // Shaking loosens particles that hold each other by a little; deep overlaps that stay mean that there is no room.
+            // A perturbation frees particles that block each other slightly; deep overlaps that persist show that there
+            // is no room.
             let hopeless = overlaps.worst > HOPELESS;
             let patience = match (assembly.can_entangle(), hopeless) {
                 (true, _) => WATCH,
@@ -117,9 +122,9 @@ pub(crate) fn relax(
     End::Stuck
 }
 
-/// Takes the smaller one of every pair that overlaps about as much as any to the best of many places drawn anywhere.
+/// Moves the smaller particle of each of the deepest overlaps to the best of many random positions.
 ///
-/// Rings that are linked, but too thick for each other, can only be parted so.
+/// Linked rings that are too thick for each other can only be separated in this way.
 fn rescue(
     assembly: &mut Assembly<'_>,
     period: &PeriodicBox,
@@ -128,7 +133,7 @@ fn rescue(
     seed: u64,
     number: u64,
 ) {
-    const PLACES: usize = 100;
+    const POSITIONS: usize = 100;
     let deepest = overlaps.pushes().map(|push| push.force.norm()).fold(0.0, f64::max);
     let mut trapped: Vec<usize> = overlaps
         .pushes()
@@ -143,7 +148,7 @@ fn rescue(
     let mut bodies = OneByOne::full(assembly, period, swelling);
     for i in trapped {
         let mut best = (f64::INFINITY, bodies.assembly.pose(i));
-        for _ in 0..PLACES {
+        for _ in 0..POSITIONS {
             let centre = anywhere(&mut rng, period);
             bodies.try_pose(i, centre, isotropic_rotation(&mut rng));
             let energy = bodies.energy(i);
@@ -156,26 +161,26 @@ fn rescue(
     }
 }
 
-/// Moves and turns every particle a little at random.
+/// Moves and rotates every particle slightly at random.
 fn shake(assembly: &mut Assembly<'_>, seed: u64, number: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(number);
     let mut draw = || Vector3::from_fn(|_, _| 0.3 * (2.0 * rng.random::<f64>() - 1.0));
     for i in 0..assembly.len() {
-        let way = draw() * assembly.radius[i];
-        assembly.shift(i, &way);
+        let shift = draw() * assembly.radius[i];
+        assembly.shift(i, &shift);
         if !assembly.round {
             assembly.turn(i, &draw());
         }
     }
 }
 
-/// The list of pairs that may meet, renewed when somebody has moved too far.
+/// The list of pairs that may overlap, renewed when a particle has moved too far.
 struct Nearby {
     neighbours: Neighbours,
     memory: Vec<Memory>,
     swelling: f64,
-    /// Everybody's place when the list was made.
+    /// Positions when the list was made.
     place: Vec<Vector3<f64>>,
     mean: f64,
     skin: f64,
@@ -211,7 +216,7 @@ impl Nearby {
         {
             return;
         }
-        // A wide skin is dear at every step, a narrow one is soon outrun.
+        // A wide skin costs at every step, a narrow one soon requires a new list.
         self.skin = if self.age < 6 {
             (1.3 * self.skin).min(2.0 * self.mean)
         } else {
@@ -247,9 +252,10 @@ impl Motion {
         let count = assembly.len();
         let turning = if assembly.round { 0 } else { count };
         let mean = assembly.radius.iter().sum::<f64>() / count.max(1) as f64;
-        // A large particle is held by as many contacts as its surface has room for: mass by surface keeps all frequencies alike.
+        // The number of contacts of a large particle grows with its surface: a mass proportional to the surface keeps
+        // all frequencies equal.
         let mass: Vec<f64> = assembly.radius.iter().map(|r| (r / mean).powi(2).max(1.0)).collect();
-        // A contact at the far end of a rod turns it most easily.
+        // A contact at the end of a rod rotates it most easily.
         let inertia = (0..turning)
             .map(|i| 0.4 * mass[i] * assembly.reach(i).powi(2))
             .collect();
@@ -266,11 +272,11 @@ impl Motion {
         }
     }
 
-    /// One step down the energy whose overlaps were just found.
+    /// One step of the descent, from the overlaps just found.
     fn advance(&mut self, assembly: &mut Assembly<'_>, overlaps: &Overlaps) {
         self.gather(assembly, overlaps);
         self.age += 1;
-        // The nearer to jamming, the slower the slowest motions: let momentum build up for them.
+        // Near jamming the slowest motions are very slow: let their momentum build up.
         let keep = match self.age {
             0..150 => 0.9,
             150..500 => 0.95,

@@ -1,45 +1,47 @@
-//! From unfolded number densities to particles.
+//! Particles from unfolded number densities.
 
 use crate::conversions::truncated;
 use crate::population::{BINS, Grain, MOST, PopulationError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Number densities of one type of particle: what unfolding gives.
+/// Number densities of one type of particle, the result of unfolding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeDensities<'a> {
     /// Index of the body.
     pub shape: usize,
     /// Colour category.
     pub category: u8,
-    /// Bin edges (a, b], one more than bins; lengths.
+    /// Edges of the bins (a, b], one more than bins; lengths.
     pub edges: &'a [f64],
-    /// Particles per unit volume in each bin. Bins of which nothing is known hold 0.
+    /// Particles per unit volume in each bin; 0 in bins without an estimate.
     pub number_density: &'a [f64],
 }
 
-/// Where in its bin a particle's size lies: as the kernel assumed that unfolded the densities.
+/// Position of a particle's size in its bin, as assumed by the kernel that unfolded the densities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SizeInBin {
-    /// Evenly spread over the bin: of `n` particles one is drawn from each n-th part.
+    /// Spread over the bin: one of `n` particles is drawn from each n-th part.
     #[default]
     Spread,
     /// At the upper edge, as in the paper.
     UpperEdge,
 }
 
-/// Whole numbers of particles in a volume that has these number densities: the cumulative numbers from the largest bin down, rounded.
+/// Whole numbers of particles in a volume with these number densities: cumulative numbers from the largest bin down are
+/// rounded.
 ///
-/// So no bin and no number of particles above a size is off by more than one, and their total by at most a half; rounding each bin alone would lose all the
-/// rare large particles, which hold most of the volume.
+/// The number in any bin and above any size is within one of its expectation, and the total within a half. Rounding
+/// each bin alone would lose the rare large particles, which contain most of the volume.
 ///
 /// # Errors
 ///
-/// [`PopulationError::Volume`]; [`PopulationError::TooMany`] above 10⁸; [`PopulationError::Histogram`] for densities that are negative or not numbers.
+/// [`PopulationError::Volume`]; [`PopulationError::TooMany`] above 10⁸; [`PopulationError::Histogram`] for densities
+/// that are negative or not finite.
 ///
 /// ```
-/// // Five bins that expect 0.4 particles each hold two together, not none.
+/// // Five bins with 0.4 expected particles each contain two particles together, not none.
 /// let counts = stereology_anneal::counts_from_densities(&[0.4; 5], 1.0)?;
 /// assert_eq!(counts.iter().sum::<usize>(), 2);
 /// # Ok::<(), stereology_anneal::PopulationError>(())
@@ -70,14 +72,16 @@ pub fn counts_from_densities(number_density: &[f64], volume: f64) -> Result<Vec<
     Ok(counts)
 }
 
-/// The particles of a volume that has these number densities, by type, largest last.
+/// The particles of a volume with these number densities, by type, largest last.
 ///
-/// Counts are those of [`counts_from_densities`]. To meet a volume fraction exactly let the box follow ([`box_for_fraction`](crate::box_for_fraction): sizes
-/// and histogram stay, densities change by the rounding) or the sizes ([`scale_to_fraction`](crate::scale_to_fraction)).
+/// Counts are those of [`counts_from_densities`]. To reach a volume fraction exactly, adjust the box
+/// ([`box_for_fraction`](crate::box_for_fraction): sizes and histogram are kept, densities change by the rounding) or
+/// the sizes ([`scale_to_fraction`](crate::scale_to_fraction)).
 ///
 /// # Errors
 ///
-/// [`PopulationError::Histogram`] unless edges increase and fit the densities; as [`counts_from_densities`].
+/// [`PopulationError::Histogram`] unless the edges increase and there is one more than densities; the errors of
+/// [`counts_from_densities`].
 ///
 /// ```
 /// use stereology_anneal::{SizeDensities, SizeInBin, grains_from_densities};
@@ -116,7 +120,7 @@ pub fn grains_from_densities(
             for k in 0..count {
                 let size = match size_in_bin {
                     SizeInBin::UpperEdge => upper,
-                    // In (lower, upper]: a size of zero is none.
+                    // In (lower, upper], so that no size is zero.
                     SizeInBin::Spread => upper - (upper - lower) * ((k as f64 + rng.random::<f64>()) / count as f64),
                 };
                 grains.push(Grain {

@@ -1,19 +1,19 @@
-//! The Minkowski difference of two bodies, by its furthest points.
+//! The Minkowski difference of two bodies, through its support points.
 
 use nalgebra::{Matrix3, Vector3};
 use stereology_shape::UnitBody;
 
-/// Something convex about the origin, in its own axes.
+/// A convex solid around the origin, in its own axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Solid<'a> {
-    /// A body about its centroid; of one that is not convex, its hull.
+    /// A body about its centroid, or its convex hull.
     Body(&'a UnitBody),
-    /// The hull of points, of which the origin is an inner one.
+    /// The convex hull of points, with the origin inside.
     Points(&'a [Vector3<f64>]),
 }
 
 impl Solid<'_> {
-    /// The furthest point in `direction`.
+    /// The support point in `direction`.
     fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Body(body) => body.support(direction).coords,
@@ -31,17 +31,17 @@ impl Solid<'_> {
     }
 }
 
-/// A solid at a size and in an orientation, about its own origin.
+/// A solid with a size and an orientation, about its own origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Posed<'a> {
     pub(crate) solid: Solid<'a>,
     pub(crate) size: f64,
-    /// From the body's axes to the world's.
+    /// From body axes to world axes.
     pub(crate) rotation: &'a Matrix3<f64>,
 }
 
 impl Posed<'_> {
-    /// How far the solid reaches in a unit direction of the world.
+    /// Support function of the solid in a unit direction in world axes.
     pub(crate) fn reach(&self, direction: &Vector3<f64>) -> f64 {
         let local = self.rotation.tr_mul(direction);
         self.size * local.dot(&self.solid.support(&local))
@@ -58,7 +58,8 @@ pub(crate) struct Difference<'a> {
     turn: Matrix3<f64>,
 }
 
-/// A point of the difference, and the point of the first body it comes from; the point of the second is `on_a − at`.
+/// A point of the difference and the corresponding point of the first body; the point of the second body is `on_a −
+/// at`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meeting {
     pub(crate) at: Vector3<f64>,
@@ -84,7 +85,7 @@ impl<'a> Difference<'a> {
         }
     }
 
-    /// The furthest point in `direction`.
+    /// The support point in `direction`.
     pub(crate) fn furthest(&self, direction: &Vector3<f64>) -> Meeting {
         let on_a = self.a.support(direction) * self.size_a;
         let in_b = self.b.support(&-self.turn.tr_mul(direction)) * self.size_b;

@@ -1,4 +1,4 @@
-//! Packings in equilibrium: random moves of hard bodies, none of which may overlap.
+//! Packings in equilibrium: Monte Carlo moves of hard bodies.
 
 use crate::assembly::Assembly;
 use crate::certificate::Packing;
@@ -13,11 +13,13 @@ use stereology_metrics::Progress;
 
 const STREAM: u64 = 23;
 
-/// A packing after `sweeps` random moves of every particle, a move that overlaps another particle taken back: hard-body Monte Carlo (Metropolis et al. 1953).
+/// A packing after `sweeps` random moves of every particle, where moves that cause an overlap are rejected: hard-body
+/// Monte Carlo (Metropolis et al. 1953).
 ///
-/// [`pack`](crate::pack) stops as soon as particles touch, so there are many near contacts. Nature's hard particles have forgotten how they were brought
-/// together; theory speaks of these. Steps are adapted to an acceptance of 30 to 50 %. Spheres at .45 forget their beginning in a few hundred sweeps; at .55 and
-/// above they may crystallise if sizes are alike. Cost: a microsecond a sphere and sweep, about twenty for polyhedra; on one core.
+/// [`pack`](crate::pack) stops as soon as no particles overlap, so the result has many near contacts. Theory describes
+/// hard particles in equilibrium, which does not depend on how they were packed. Steps are adapted to an acceptance of
+/// 30 to 50 %. Spheres at .45 reach equilibrium in a few hundred sweeps; at .55 and above they may crystallise if their
+/// sizes are similar. Cost: a microsecond per sphere and sweep, about twenty for polyhedra; uses one core.
 ///
 /// # Errors
 ///
@@ -87,6 +89,6 @@ pub fn equilibrate(packing: &Packing, sweeps: usize, seed: u64, progress: Progre
         angle = (angle * factor).min(1.0);
     }
     let particles = assembly.into_particles(&period);
-    // No accepted move overlaps, so nothing can; if rounding thinks otherwise, the packing stays as it was.
+    // No accepted move overlaps, so verification can fail only by rounding: then return the packing unchanged.
     Ok(Packing::verify(&packing.with_particles(particles)?).unwrap_or_else(|_| packing.clone()))
 }

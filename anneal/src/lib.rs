@@ -1,19 +1,24 @@
 //! Periodic packing of particles, with a certificate that none overlap.
 //!
-//! A material is rebuilt by giving every particle of the recovered size distribution a random place and orientation in a box that repeats in x, y and z,
-//! and pushing overlapping ones apart: Jagnow, Dorsey & Rushmeier 2004, section 4.1. Number, sizes and categories never change, so the volume fraction is
-//! exactly the one asked for. Spheres, ellipsoids and meshes, convex or not, mix freely; a particle may be larger than half the box.
+//! A material is rebuilt by giving every particle of the recovered size distribution a random position and orientation
+//! in a box that is periodic in x, y and z, and pushing overlapping particles apart: Jagnow, Dorsey & Rushmeier 2004,
+//! section 4.1. Number, sizes and categories never change, so the volume fraction is exactly the requested one.
+//! Spheres, ellipsoids and meshes, convex or not, can be mixed; a particle may be larger than half the box.
 //!
-//! - How deep a pair overlaps is the factor `γ = max n·d / (h_A(n) + h_B(−n))` by which it would have to shrink to part: one maximum, however deep.
-//! - [`pack`] minimises the sum of squared depths by descent with momentum, in tens to hundreds of iterations; [`Mode::Paper`] keeps the way of the paper.
-//! - [`Packing`] can only be made by [`Packing::verify`], which moves nothing and finds for every pair and every periodic image a direction that separates it.
-//!   "No overlap seen while moving" proves nothing: such a run has left overlaps of 8.5 10⁻⁴ diameters. Meshes that are not convex are moved by convex parts
-//!   ([`ConvexParts`]) or simpler proxies, and certified by the faces of the mesh itself.
-//! - [`radial_distribution`], [`bond_order`], [`orientation_tensor`] and [`section_test`] judge a packing; [`equilibrate`] makes it forget how it was made.
+//! - The overlap of a pair is measured by the factor `γ = max n·d / (h_A(n) + h_B(−n))` to which both would have to
+//!   shrink to separate. It has a single maximum however deep the overlap is.
+//! - [`pack`] minimises the sum of squared depths by gradient descent with momentum, in tens to hundreds of iterations.
+//!   [`Mode::Paper`] is the method of the paper.
+//! - A [`Packing`] can only be created by [`Packing::verify`], which moves nothing and finds a separating direction for
+//!   every pair and every periodic image. Finding no overlap while moving proves nothing: such a run left overlaps of
+//!   8.5 10⁻⁴ diameters. Meshes that are not convex are moved as convex parts ([`ConvexParts`]) or simpler proxies, and
+//!   certified by the faces of the mesh itself.
+//! - [`radial_distribution`], [`bond_order`], [`orientation_tensor`] and [`section_test`] characterise a packing;
+//!   [`equilibrate`] brings it to equilibrium, so that it no longer depends on how it was packed.
 //!
 //! # Examples
 //!
-//! How do I pack a thousand spheres of lognormal sizes to a volume fraction of one half?
+//! Pack a thousand spheres of lognormal sizes to a volume fraction of one half:
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -29,7 +34,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Do the particles of another program overlap?
+//! Check whether the particles of another program overlap:
 //!
 //! ```
 //! use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -37,7 +42,7 @@
 //! use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 //!
 //! let cube = UnitBody::new(&Body::cuboid([1.0, 1.0, 1.0])?);
-//! let size = cube.body().size(); // of edge 1
+//! let size = cube.body().size(); // edge length 1
 //! let at = |x, y, z| Particle { shape: 0, size, category: 0, position: Point3::new(x, y, z), orientation: UnitQuaternion::identity() };
 //! // Eight cubes that fill a box of side 2 touch everywhere and overlap nowhere.
 //! let corners: Vec<_> = (0..8).map(|k| at(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();

@@ -1,8 +1,8 @@
 //! Pairs of bodies that may touch, from a hierarchical grid of bounding spheres in a periodic box.
 //!
-//! Sizes of real aggregates spread over an order of magnitude. With one cell size set by the largest body, each cell would hold
-//! hundreds of small bodies; here each body lies on the level whose cells fit its own reach, and searches its own level and the
-//! coarser ones.
+//! Sizes of real aggregates spread over an order of magnitude. With one cell size set by the largest body, each cell
+//! would hold hundreds of small bodies; here each body lies on the level whose cells fit its own reach, and searches
+//! its own level and the coarser ones.
 
 use crate::conversions::{compact, floor, index, truncated};
 use crate::periodic_cells::PeriodicCells;
@@ -162,7 +162,8 @@ impl Grid {
                         continue;
                     }
                     let other = member.body as usize;
-                    // Within a level both bodies of a pair find each other: keep one. A body and its image: one of two opposite periods.
+                    // Within a level both bodies of a pair find each other: keep one. A body and its image: one of two
+                    // opposite periods.
                     if level_number > own || other > body || (other == body && period > [0, 0, 0]) {
                         found.push(Neighbour {
                             other: member.body,
@@ -176,7 +177,8 @@ impl Grid {
     }
 }
 
-/// Level of each body by its reach. Each level is about twice as coarse as the one before; sparsely filled levels join the next.
+/// Level of each body by its reach. Each level is about twice as coarse as the one before; sparsely filled levels join
+/// the next.
 pub(crate) fn levels(reach: &[f64]) -> Vec<u8> {
     let smallest = reach.iter().copied().fold(f64::INFINITY, f64::min);
     let fine: Vec<usize> = reach

@@ -1,5 +1,5 @@
-//! Bodies near a point while bodies are inserted and moved one at a time: the hierarchical grid of [`neighbours`](crate::neighbours), updated after
-//! each move.
+//! Bodies near a point while bodies are inserted and moved one at a time: the hierarchical grid of
+//! [`neighbours`](crate::neighbours), updated after each move.
 
 use crate::conversions::compact;
 use crate::neighbours::levels;
@@ -70,7 +70,8 @@ impl Occupancy {
 
     /// Visits every body in the cells within `reach` of a point of the box, with the displacement of its image.
     ///
-    /// All images are visited, those of a body at the point itself included, and each once, however few cells an axis has.
+    /// All images are visited, those of a body at the point itself included, and each once, however few cells an axis
+    /// has.
     pub(crate) fn visit<B>(
         &self,
         centre: &Vector3<f64>,

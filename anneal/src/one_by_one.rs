@@ -1,4 +1,4 @@
-//! Particles moved one at a time: what a particle overlaps where it is.
+//! Moving particles one at a time: overlaps of one particle at its position.
 
 use crate::assembly::Assembly;
 use crate::conversions::floor;
@@ -9,7 +9,7 @@ use rand_distr::{Distribution, UnitBall};
 use std::ops::ControlFlow;
 use stereology_shape::PeriodicBox;
 
-/// An assembly of which one particle at a time is moved.
+/// An assembly in which one particle is moved at a time.
 pub(crate) struct OneByOne<'a, 'b> {
     pub(crate) assembly: &'a mut Assembly<'b>,
     occupancy: Occupancy,
@@ -18,7 +18,7 @@ pub(crate) struct OneByOne<'a, 'b> {
 }
 
 impl<'a, 'b> OneByOne<'a, 'b> {
-    /// Nobody is in the box yet.
+    /// No particle is in the box yet.
     pub(crate) fn empty(assembly: &'a mut Assembly<'b>, period: &PeriodicBox, swelling: f64) -> Self {
         assembly.wrap(period);
         let reach: Vec<f64> = (0..assembly.len()).map(|i| assembly.reach(i) * swelling).collect();
@@ -30,25 +30,26 @@ impl<'a, 'b> OneByOne<'a, 'b> {
         }
     }
 
-    /// All are in the box.
+    /// All particles are in the box.
     pub(crate) fn full(assembly: &'a mut Assembly<'b>, period: &PeriodicBox, swelling: f64) -> Self {
         let mut all = Self::empty(assembly, period, swelling);
         (0..all.assembly.len()).for_each(|i| all.settle(i));
         all
     }
 
-    /// The particle is where its pose says.
+    /// Records the position of a particle in the grid.
     pub(crate) fn settle(&mut self, i: usize) {
         self.occupancy.place(i, &self.assembly.centre[i]);
     }
 
-    /// Tries a pose, in the box; [`settle`](Self::settle) makes it final.
+    /// Sets a pose, wrapped into the box; [`settle`](Self::settle) makes it final.
     pub(crate) fn try_pose(&mut self, i: usize, centre: Vector3<f64>, rotation: UnitQuaternion<f64>) {
         let centre = self.period.wrap(&Point3::from(centre)).coords;
         self.assembly.set_pose(i, (centre, rotation));
     }
 
-    /// Energy of all overlaps of a particle with others in the box and with its own images; the latter counted half from each side.
+    /// Energy of all overlaps of a particle with others in the box and with its own images; the latter count half,
+    /// since each is found from both sides.
     pub(crate) fn energy(&self, i: usize) -> f64 {
         let mut energy = 0.0;
         let _ = self.each_overlap(i, |j, overlap| {
@@ -58,7 +59,7 @@ impl<'a, 'b> OneByOne<'a, 'b> {
         energy
     }
 
-    /// Whether a particle overlaps nobody in the box.
+    /// Whether a particle overlaps no particle in the box.
     pub(crate) fn vacant(&self, i: usize) -> bool {
         self.each_overlap(i, |_, overlap| {
             if overlap > 0.0 {
@@ -70,7 +71,7 @@ impl<'a, 'b> OneByOne<'a, 'b> {
         .is_continue()
     }
 
-    /// The energy of each pair of a particle with another, or with an image of itself if it is in the box.
+    /// Visits the energy of each pair of a particle with another one in the box, and with images of itself.
     pub(crate) fn each_overlap(
         &self,
         i: usize,
@@ -88,7 +89,7 @@ impl<'a, 'b> OneByOne<'a, 'b> {
             })
     }
 
-    /// A particle's own images move with it, so they are asked for where it is, not where it was settled.
+    /// The images of a particle move with it, so they follow its current position, not the position in the grid.
     fn own_images(&self, i: usize, visitor: &mut impl FnMut(usize, f64) -> ControlFlow<()>) -> ControlFlow<()> {
         let sides = self.period.sides();
         let longest = 2.0 * self.swelling * self.assembly.reach(i);
@@ -110,12 +111,12 @@ impl<'a, 'b> OneByOne<'a, 'b> {
     }
 }
 
-/// A point of the unit ball.
+/// A random point of the unit ball.
 pub(crate) fn in_ball(rng: &mut impl Rng) -> Vector3<f64> {
     Vector3::from(UnitBall.sample(rng))
 }
 
-/// A place anywhere in the box.
+/// A random point of the box.
 pub(crate) fn anywhere(rng: &mut impl Rng, period: &PeriodicBox) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.random::<f64>()).component_mul(&period.sides())
 }

@@ -4,10 +4,12 @@ use crate::proxies::Proxy;
 
 /// How particles are moved apart, with the parameters of that method.
 ///
-/// [`fast`](Self::fast), [`paper`](Self::paper), [`anneal`](Self::anneal) and [`sequential`](Self::sequential) have the default parameters.
+/// [`fast`](Self::fast), [`paper`](Self::paper), [`anneal`](Self::anneal) and [`sequential`](Self::sequential) have the
+/// default parameters.
 ///
-/// `swelling` multiplies sizes while particles move, so that overlaps at true size vanish in a finite number of iterations; true sizes are certified. It lies
-/// between 1.0001 and 1.05. `None` takes a third of the room that is left below random close packing: 1.02 in loose packings, 1.002 in dense ones.
+/// `swelling` multiplies sizes while particles move, so that overlaps at true size vanish in a finite number of
+/// iterations; true sizes are certified. It lies between 1.0001 and 1.05. `None` takes a third of the room that is left
+/// below random close packing: 1.02 in loose packings, 1.002 in dense ones.
 ///
 /// # Examples
 ///
@@ -28,24 +30,25 @@ pub enum Mode {
         /// Factor on sizes while particles move.
         swelling: Option<f64>,
     },
-    /// Jagnow, Dorsey & Rushmeier 2004, section 4.1: find all collisions, push positions apart, repeat. Orientations stay as they were drawn. Takes about ten
-    /// times the iterations of [`Mode::Fast`].
+    /// Jagnow, Dorsey & Rushmeier 2004, section 4.1: find all collisions, push positions apart, repeat. Orientations
+    /// stay as they were drawn. Takes about ten times the iterations of [`Mode::Fast`].
     Paper {
         /// Maximum number of iterations.
         iterations: usize,
         /// Factor on sizes while particles move.
         swelling: Option<f64>,
     },
-    /// Simulated annealing: single shifts, rotations, swaps and re-insertions by the Metropolis rule while the temperature falls, then a quench with the descent
-    /// of [`Mode::Fast`]. Uses one core.
+    /// Simulated annealing: single shifts, rotations, swaps and re-insertions by the Metropolis rule while the
+    /// temperature falls, then a quench with the descent of [`Mode::Fast`]. Uses one core.
     Anneal {
         /// Maximum number of sweeps (at most 200) and iterations of the quench, together.
         iterations: usize,
         /// Factor on sizes while particles move.
         swelling: Option<f64>,
     },
-    /// Random sequential addition (Jagnow, Dorsey & Rushmeier 2004, section 4.1, which dismisses it): one particle at a time, the largest first, at random
-    /// positions until one is vacant. Jams at a volume fraction of about .35 ([`PackError::Jammed`](crate::PackError::Jammed)). Uses one core.
+    /// Random sequential addition (Jagnow, Dorsey & Rushmeier 2004, section 4.1, which dismisses it): one particle at a
+    /// time, the largest first, at random positions until one is vacant. Jams at a volume fraction of about .35
+    /// ([`PackError::Jammed`](crate::PackError::Jammed)). Uses one core.
     Sequential {
         /// Maximum number of random positions for one particle.
         tries: usize,
@@ -54,8 +57,9 @@ pub enum Mode {
 
 /// Default limit of every mode.
 ///
-/// [`Mode::Fast`] needs tens to hundreds of iterations and stops by itself when overlaps no longer shrink, [`Mode::Paper`] about ten times as many. Where one
-/// position in 5,000 is vacant, so many tries find one with probability .98.
+/// [`Mode::Fast`] needs tens to hundreds of iterations and stops by itself when overlaps no longer shrink,
+/// [`Mode::Paper`] about ten times as many. Where one position in 5,000 is vacant, so many tries find one with
+/// probability .98.
 const LIMIT: usize = 20_000;
 
 impl Mode {
@@ -123,10 +127,11 @@ pub struct PackOptions {
     pub mode: Mode,
     /// What represents meshes while particles move.
     pub proxy: Proxy,
-    /// Relative excess volume allowed to the convex parts of a body that is not convex: .005 to 1. Particles keep that much space around them free, and the
-    /// cost grows with their number of parts.
+    /// Relative excess volume allowed to the convex parts of a body that is not convex: .005 to 1. Particles keep that
+    /// much space around them free, and the cost grows with their number of parts.
     pub tolerance: f64,
-    /// Seed of random moves: those of annealing and sequential addition, and the perturbation of particles that jam in [`Mode::Fast`].
+    /// Seed of random moves: those of annealing and sequential addition, and the perturbation of particles that jam in
+    /// [`Mode::Fast`].
     pub seed: u64,
 }
 

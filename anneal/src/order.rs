@@ -1,10 +1,10 @@
-//! Order in a packing: do particles line up, do they crystallise?
+//! Order in a packing: alignment of particles and crystallisation.
 
 use crate::neighbours::Neighbours;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use stereology_shape::{Particle, PeriodicBox};
 
-/// How an axis of particles is spread over directions.
+/// Distribution of the directions of an axis of the particles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct OrientationTensor {
@@ -12,11 +12,13 @@ pub struct OrientationTensor {
     pub tensor: Matrix3<f64>,
     /// Its eigenvalues, ascending.
     pub eigenvalues: [f64; 3],
-    /// Bingham's statistic `15/2 N Σ (λ − 1/3)²`: for isotropic directions χ² of 5 degrees of freedom (one in a million exceeds 35.9).
+    /// Bingham's statistic `15/2 N Σ (λ − 1/3)²`: for isotropic directions χ² of 5 degrees of freedom (one in a million
+    /// exceeds 35.9).
     pub bingham: f64,
 }
 
-/// The orientation tensor of a body axis (in the body's own coordinates, any length but 0). `None` without particles or without axis.
+/// The orientation tensor of a body axis, given in body coordinates with any length except 0. `None` without particles
+/// or without an axis.
 ///
 /// # References
 ///
@@ -57,19 +59,21 @@ pub fn orientation_tensor(particles: &[Particle], axis: &Vector3<f64>) -> Option
     })
 }
 
-/// Steinhardt's order of the sixth degree.
+/// Bond-orientational order of degree 6 (Steinhardt).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BondOrder {
-    /// Q₆ of all bonds together: about 1/√(number of bonds) if disordered, .57 in a face-centred cubic crystal, .48 hexagonal, .51 body-centred.
+    /// Q₆ of all bonds: about 1/√(number of bonds) if disordered, .57 in a face-centred cubic crystal, .48 hexagonal,
+    /// .51 body-centred.
     pub global: f64,
-    /// Mean over particles of q₆ of their own bonds.
+    /// Mean over particles of q₆ of their bonds.
     pub local: f64,
     /// Number of bonds, each counted once.
     pub bonds: usize,
 }
 
-/// Q₆ of the bonds between particles whose centres are nearer than `cutoff` times the mean of their sizes; 1.4 is the first shell of spheres.
+/// Q₆ of the bonds between particles whose centres are closer than `cutoff` times the mean of their sizes; 1.4 gives
+/// the first shell of spheres.
 ///
 /// # Formula
 ///
@@ -116,7 +120,7 @@ pub fn bond_order(particles: &[Particle], period: &PeriodicBox, cutoff: f64) -> 
             let Some(direction) = bond.try_normalize(0.0) else {
                 continue;
             };
-            // Of even degree: the same from either end.
+            // The degree is even: the value is the same from either end.
             let harmonics = Harmonics::of(&direction);
             all.add(&harmonics);
             bonds += 1;
@@ -152,7 +156,7 @@ struct Harmonics {
 impl Harmonics {
     fn of(n: &Vector3<f64>) -> Self {
         let z = n.z;
-        // P₆ᵐ(z) / (1 − z²)^(m/2); the rest of the sine goes into (x + iy)ᵐ.
+        // P₆ᵐ(z) / (1 − z²)^(m/2); (x + iy)ᵐ contains the remaining factor of the sine.
         let z2 = z * z;
         let legendre = [
             (((231.0 * z2 - 315.0) * z2 + 105.0) * z2 - 5.0) / 16.0,

@@ -1,4 +1,4 @@
-//! From any arrangement of particles to one without overlaps.
+//! Moving particles from any arrangement to one without overlaps.
 
 use crate::annealing;
 use crate::assembly::{Assembly, SWELLING_MOST};
@@ -15,117 +15,121 @@ use std::ops::ControlFlow;
 use stereology_metrics::Progress;
 use stereology_shape::{Arrangement, ArrangementError, Particle, PeriodicBox};
 
-/// Why there is no packing.
+/// Why packing failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackError {
-    /// A particle is not valid.
+    /// A particle is invalid.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
-    /// A particle cannot but overlap its own image.
+    /// A particle is so wide that it always overlaps its own image.
     #[error(
-        "particle {index} holds a ball of diameter {diameter}, wider than the box ({side}), so it overlaps its own periodic image: take a larger box"
+        "particle {index} contains a sphere of diameter {diameter}, wider than the box ({side}), so it overlaps its own periodic image: use a larger box"
     )]
     TooWide {
-        /// Which particle.
+        /// Index of the particle.
         index: usize,
-        /// Diameter of the ball in it.
+        /// Diameter of its inscribed sphere.
         diameter: f64,
         /// Shortest side of the box.
         side: f64,
     },
-    /// No packing so dense is known to be possible.
+    /// No packing of this density is known to be possible.
     #[error(
-        "a volume fraction of {fraction:.4} is more than such bodies are known to reach ({limit:.4}): ask for less"
+        "a volume fraction of {fraction:.4} exceeds the densest known packing of such bodies ({limit:.4}): request a lower fraction"
     )]
     TooDense {
-        /// What was asked for.
+        /// Requested fraction.
         fraction: f64,
         /// See [`density_limit`].
         limit: f64,
     },
-    /// An option is out of range.
+    /// The swelling is out of range.
     #[error("the swelling {0} is not between 1.0001 and 1.05")]
     Swelling(f64),
-    /// An option is out of range.
+    /// The volume tolerance is out of range.
     #[error("the volume tolerance of convex parts {0} is not between 0.005 and 1")]
     Tolerance(f64),
-    /// No vacant place was found for a particle.
+    /// No vacant position was found for a particle.
     #[error("{0}")]
     Jammed(Box<Jam>),
     /// Overlaps remain.
     #[error("{0}")]
     Unresolved(Box<Unresolved>),
-    /// The caller's progress function said so.
+    /// The progress callback cancelled the work.
     #[error("packing was cancelled")]
     Cancelled,
 }
 
-/// A packing that was not reached.
+/// Overlaps that could not be removed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "at a volume fraction of {fraction:.4} overlaps remain after {iterations} iterations: {overlaps} take a larger box or a lower fraction, another seed, or more iterations"
+    "at a volume fraction of {fraction:.4} overlaps remain after {iterations} iterations: {overlaps} use a larger box, a lower fraction, another seed, or more iterations"
 )]
 #[non_exhaustive]
 pub struct Unresolved {
-    /// What remains, at true sizes.
+    /// Remaining overlaps, at true sizes.
     pub overlaps: Overlaps,
-    /// The volume fraction asked for.
+    /// Requested volume fraction.
     pub fraction: f64,
-    /// Iterations made.
+    /// Number of iterations.
     pub iterations: usize,
     /// Energy of the overlaps at each iteration.
     pub energies: Vec<f64>,
-    /// The particles where they were left.
+    /// The particles at their final positions.
     pub particles: Vec<Particle>,
 }
 
-/// Where sequential placing came to an end.
+/// State in which sequential addition jammed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "jammed at a volume fraction of {reached:.4} (of {fraction:.4}): {} of {count} particles found a vacant place, the next, of size {size:.4}, none in {tries} tries; take a lower fraction, or mode fast, which moves particles aside",
+    "jammed at a volume fraction of {reached:.4} (of {fraction:.4}): {} of {count} particles found a vacant position, the next, of size {size:.4}, found none in {tries} tries; use a lower fraction, or mode fast, which moves particles aside",
     placed.len()
 )]
 #[non_exhaustive]
 pub struct Jam {
-    /// The particles that have a place, the largest first.
+    /// The particles that have a position, the largest first.
     pub placed: Vec<Particle>,
-    /// How many there are in all.
+    /// Total number of particles.
     pub count: usize,
-    /// Size of the one that found none.
+    /// Size of the particle that found no position.
     pub size: f64,
-    /// How many places it was tried at.
+    /// Number of positions tried for it.
     pub tries: usize,
-    /// The volume fraction of those that have a place.
+    /// Volume fraction of the placed particles.
     pub reached: f64,
-    /// The volume fraction asked for.
+    /// Requested volume fraction.
     pub fraction: f64,
 }
 
-/// Moves (and turns) particles until none overlap, and proves it.
+/// Moves and rotates particles until none overlap, and certifies the result.
 ///
-/// Positions and orientations given are where they start, overlapping as they may; [`populate`](crate::populate) draws them at random. Number, sizes and
-/// categories stay, so the volume fraction is what was asked for; a centre that leaves the box on one side enters it on the other.
+/// The given positions and orientations are the start and may overlap; [`populate`](crate::populate) draws them at
+/// random. Number, sizes and categories are kept, so the volume fraction is the requested one. A centre that leaves the
+/// box re-enters it on the opposite side.
 ///
 /// # Method
 ///
-/// [`Mode::Fast`] minimises `Σ ½ δ²` by gradient descent with momentum, where `δ` is the depth of an overlap along the direction in which the pair would
-/// first part if both shrank about their centroids: towards each other's centres for spheres, found by portal refinement for other convex bodies, between convex
-/// parts ([`ConvexParts`](crate::ConvexParts)) for bodies that are not convex. Bodies that
-/// are not spheres start with up to a hundred iterations as spheres of their volumes. Sizes are swollen by half a percent or so meanwhile: then overlaps at
-/// true size vanish altogether in finite time. The same bits at any number of threads.
+/// [`Mode::Fast`] minimises `Σ ½ δ²` by gradient descent with momentum. `δ` is the depth of an overlap along the
+/// direction in which the pair would first separate if both shrank about their centroids: the line of centres for
+/// spheres, found by portal refinement for other convex bodies, and between convex parts
+/// ([`ConvexParts`](crate::ConvexParts)) for bodies that are not convex. Bodies that are not spheres start with up to a
+/// hundred iterations as spheres of equal volume. Meanwhile sizes are swollen by about half a percent, so that overlaps
+/// at true size vanish in a finite number of iterations. The result does not depend on the number of threads.
 ///
-/// Measured (seconds of one core): 1,000 spheres, lognormal σ .3, at .60 / .64: .02 / .04; 10,000: .22 / .45; 100,000 at .60 2.6; rocks of about 20 vertices: 1,000 at .5
-/// .12, 5,000 at .5 .74; ellipsoids 1,000 at .5 .09; 5:1 rods 300 at .3 .17. [`Mode::Paper`]: 1,000 spheres at .6 1.5.
+/// Measured seconds of one core: 1,000 spheres, lognormal σ .3, at .60 / .64: .02 / .04; 10,000: .22 / .45; 100,000 at
+/// .60: 2.6; rocks of about 20 vertices: 1,000 at .5: .12, 5,000 at .5: .74; 1,000 ellipsoids at .5: .09; 300 rods 5:1
+/// at .3: .17. [`Mode::Paper`]: 1,000 spheres at .6: 1.5.
 ///
 /// # Progress
 ///
-/// `progress` gets a guess in 0..1 of what is done, never decreasing; `ControlFlow::Break` cancels.
+/// `progress` receives an estimate of the completed fraction, which never decreases.
 ///
 /// # Errors
 ///
-/// [`PackError::Unresolved`] with what remains, if particles jam; [`PackError::Jammed`] if one finds no place; [`PackError::TooDense`] and
-/// [`PackError::TooWide`] before anything is done; [`PackError::Cancelled`].
+/// [`PackError::Unresolved`] with the remaining overlaps if particles jam; [`PackError::Jammed`] if a particle finds no
+/// position; [`PackError::TooDense`], [`PackError::TooWide`], [`PackError::Swelling`] and [`PackError::Tolerance`]
+/// before any work; [`PackError::Cancelled`].
 ///
 /// # Examples
 ///
@@ -144,13 +148,13 @@ pub struct Jam {
 /// ```
 pub fn pack(arrangement: &Arrangement, options: &PackOptions, progress: Progress<'_>) -> Result<Packing, PackError> {
     let (bodies, particles, period) = (arrangement.bodies(), arrangement.particles(), arrangement.period());
-    let fraction = refuse_the_impossible(arrangement)?;
+    let fraction = check_density(arrangement)?;
     check_options(options)?;
     let stand_ins: Vec<StandIn> = bodies
         .iter()
         .map(|body| StandIn::of(body, options.proxy, options.tolerance))
         .collect();
-    // Neighbours in space are neighbours in memory.
+    // Order the particles so that neighbours in space are neighbours in memory.
     let order = along_a_curve(particles, period);
     let particles = order.iter().map(|&i| particles[i]).collect();
     let mut assembly = Assembly::new(bodies, &stand_ins, particles, period);
@@ -178,7 +182,7 @@ pub fn pack(arrangement: &Arrangement, options: &PackOptions, progress: Progress
     }
     match Packing::verify(&arrangement.with_particles(particles.as_slice())?) {
         Ok(packing) => {
-            // Nothing is left to cancel; a caller who breaks now has the packing all the same.
+            // The work is complete: cancelling now has no effect.
             let _ = progress(1.0);
             Ok(match trace {
                 Trace::Tries(tries) => packing.with_tries(tries),
@@ -229,13 +233,13 @@ fn relax(
     limits: &Limits,
     progress: Progress<'_>,
 ) -> Result<Vec<f64>, PackError> {
-    let guess = Guess::new(progress);
-    let report = |pushes: &Pushes| guess.report(pushes);
+    let estimate = Estimate::new(progress);
+    let report = |pushes: &Pushes| estimate.report(pushes);
     let mut energies = Vec::new();
     let end = match mode {
         Mode::Paper { .. } => paper::relax(assembly, period, limits, &mut energies, &report),
         Mode::Anneal { .. } => annealing::anneal(assembly, period, limits, &mut energies, progress),
-        _ => match as_balls(assembly, period, limits, &mut energies, progress) {
+        _ => match as_spheres(assembly, period, limits, &mut energies, progress) {
             End::Cancelled => End::Cancelled,
             _ => damped::relax(assembly, period, limits, &mut energies, &report),
         },
@@ -271,7 +275,7 @@ fn jammed(
     }))
 }
 
-fn refuse_the_impossible(arrangement: &Arrangement) -> Result<f64, PackError> {
+fn check_density(arrangement: &Arrangement) -> Result<f64, PackError> {
     let side = arrangement.sides().min();
     for (index, particle) in arrangement.particles().iter().enumerate() {
         let body = &arrangement.bodies()[particle.shape];
@@ -289,7 +293,7 @@ fn refuse_the_impossible(arrangement: &Arrangement) -> Result<f64, PackError> {
     }
 }
 
-/// The order in which a Z-curve through the box meets the particles.
+/// Order of the particles along a Z-curve through the box.
 fn along_a_curve(particles: &[Particle], period: &PeriodicBox) -> Vec<usize> {
     let place = |particle: &Particle| period.curve_place(&particle.position);
     let mut order: Vec<(u32, usize)> = particles.iter().map(place).zip(0..).collect();
@@ -297,15 +301,15 @@ fn along_a_curve(particles: &[Particle], period: &PeriodicBox) -> Vec<usize> {
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Swelling takes a third of the room that is left below the density of a random close packing.
+/// Swelling uses about a third of the room that is left below random close packing.
 fn swelling_for(fraction: f64) -> f64 {
     const RANDOM_CLOSE: f64 = 0.64;
     let room = (RANDOM_CLOSE / fraction.max(1e-6)).cbrt() - 1.0;
     (1.0 + 0.3 * room).clamp(1.002, 1.02)
 }
 
-/// Spreads bodies that overlap deeply as if they were spheres of their volumes: that costs next to nothing.
-fn as_balls(
+/// Separates bodies that overlap deeply as spheres of equal volume first, which costs almost nothing.
+fn as_spheres(
     assembly: &mut Assembly<'_>,
     period: &PeriodicBox,
     limits: &Limits,
@@ -321,7 +325,7 @@ fn as_balls(
     assembly.overlaps(&neighbours, &mut vec![Memory::NONE; neighbours.len()], 1.0, &mut pushes);
     let square = assembly.radius.iter().map(|r| r * r).sum::<f64>();
     if pushes.energy < 0.01 * square {
-        // A good start is left as it is.
+        // A good start is not changed.
         return End::Apart;
     }
     assembly.round = true;
@@ -334,30 +338,30 @@ fn as_balls(
     end
 }
 
-/// Guesses from the fall of the energy how far a relaxation has come.
-struct Guess<'a> {
+/// Estimates the progress of a relaxation from the decrease of the energy.
+struct Estimate<'a> {
     progress: Progress<'a>,
     first: Cell<f64>,
-    said: Cell<f64>,
+    reported: Cell<f64>,
 }
 
-impl<'a> Guess<'a> {
+impl<'a> Estimate<'a> {
     fn new(progress: Progress<'a>) -> Self {
         Self {
             progress,
             first: Cell::new(0.0),
-            said: Cell::new(0.0),
+            reported: Cell::new(0.0),
         }
     }
 
     fn report(&self, pushes: &Pushes) -> ControlFlow<()> {
-        /// Overlaps end at about this part of the first energy.
+        /// Overlaps vanish at about this fraction of the first energy.
         const LAST: f64 = 1e-6;
         if self.first.get() == 0.0 {
             self.first.set(pushes.energy.max(f64::MIN_POSITIVE));
         }
         let done = (pushes.energy / self.first.get()).max(f64::MIN_POSITIVE).ln() / LAST.ln();
-        self.said.set(self.said.get().max(done.min(0.99)));
-        (self.progress)(self.said.get())
+        self.reported.set(self.reported.get().max(done.min(0.99)));
+        (self.progress)(self.reported.get())
     }
 }

@@ -1,9 +1,10 @@
-//! The way of the paper: "repeatedly searches for all collisions and then relaxes particle positions".
+//! The method of the paper: "repeatedly searches for all collisions and then relaxes particle positions".
 //!
 //! # References
 //!
-//! Jagnow, Dorsey & Rushmeier 2004, section 4.1. The text gives neither step nor stopping rule; collisions are found anew at every iteration in a grid, every
-//! colliding pair is pushed apart along its direction of contact by a part of its depth, all pairs at once, and orientations stay as they were drawn.
+//! Jagnow, Dorsey & Rushmeier 2004, section 4.1. The text gives neither step length nor stopping rule. Here, each
+//! iteration finds all collisions in a grid and pushes every colliding pair apart along its contact direction by a
+//! fraction of its depth, all pairs at once. Orientations do not change.
 
 use crate::assembly::Assembly;
 use crate::contacts::{Memory, Overlaps};
@@ -12,8 +13,9 @@ use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use stereology_shape::PeriodicBox;
 
-/// Part of a depth each particle of a pair yields in one iteration: more lets crowded particles jump to and fro.
-const YIELD: f64 = 0.25;
+/// Fraction of the depth by which each particle of a pair moves in one iteration. With more, crowded particles
+/// oscillate.
+const FRACTION: f64 = 0.25;
 
 /// Relaxes until no pair overlaps at true size. Energies are appended to `trace`.
 pub(crate) fn relax(
@@ -24,7 +26,7 @@ pub(crate) fn relax(
     progress: &dyn Fn(&Overlaps) -> ControlFlow<()>,
 ) -> End {
     let mut overlaps = Overlaps::default();
-    let mut ways = vec![Vector3::zeros(); assembly.len()];
+    let mut shifts = vec![Vector3::zeros(); assembly.len()];
     for _ in 0..limits.iterations {
         assembly.wrap(period);
         let neighbours = assembly.neighbours(limits.swelling, 0.0);
@@ -37,13 +39,13 @@ pub(crate) fn relax(
         if progress(&overlaps).is_break() {
             return End::Cancelled;
         }
-        ways.fill(Vector3::zeros());
+        shifts.fill(Vector3::zeros());
         for push in overlaps.pushes() {
-            ways[push.a as usize] -= push.force * YIELD;
-            ways[push.b as usize] += push.force * YIELD;
+            shifts[push.a as usize] -= push.force * FRACTION;
+            shifts[push.b as usize] += push.force * FRACTION;
         }
-        for (i, way) in ways.iter().enumerate() {
-            assembly.shift(i, way);
+        for (i, shift) in shifts.iter().enumerate() {
+            assembly.shift(i, shift);
         }
     }
     End::Stuck

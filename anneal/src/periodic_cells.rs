@@ -1,8 +1,8 @@
 //! A grid of cells in a periodic box, searched across the walls of the box.
 //!
-//! A search uses unwrapped cell numbers: number `k` of `n` along an axis is cell `k mod n` in the period `floor(k / n)`. Every
-//! periodic image is found once and none is missed, whether an axis has one cell or a thousand, and whether a body is smaller or
-//! larger than the box.
+//! A search uses unwrapped cell numbers: number `k` of `n` along an axis is cell `k mod n` in the period `floor(k /
+//! n)`. Every periodic image is found once and none is missed, whether an axis has one cell or a thousand, and whether
+//! a body is smaller or larger than the box.
 
 use crate::conversions::{floor, index};
 use nalgebra::Vector3;

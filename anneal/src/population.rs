@@ -1,4 +1,4 @@
-//! Which particles are to be packed: their sizes, shapes and categories, and the box they fill.
+//! The particles to be packed: their sizes, shapes and categories, and the box that they fill.
 
 use crate::conversions::truncated;
 use nalgebra::{Point3, Vector3};
@@ -8,67 +8,70 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stereology_shape::{Particle, PeriodicBox, UnitBody, isotropic_rotation};
 
-/// A particle that has no place yet.
+/// A particle without a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grain {
     /// Index of its body.
     pub shape: usize,
-    /// Diameter of the circle with the area of its largest section.
+    /// Equivalent circular diameter (ECD) of its largest section.
     pub size: f64,
     /// Colour category.
     pub category: u8,
 }
 
-/// A population that cannot be made.
+/// Why a population cannot be created.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PopulationError {
-    /// The width of a size distribution is negative or not a number.
+    /// The width of a size distribution is negative or not finite.
     #[error("the standard deviation of the logarithm of sizes is {0}; it must be finite and not negative")]
     Sigma(f64),
     /// A size is not a positive number.
-    #[error("size {size} at place {index} is not a positive finite length")]
+    #[error("size {size} at index {index} is not a positive finite length")]
     Size {
-        /// Which.
+        /// Index of the size.
         index: usize,
         /// The size.
         size: f64,
     },
-    /// A share is negative or not a number, or none is positive.
-    #[error("share {share} of shape {shape} cannot be: shares are finite, not negative, and some are positive")]
+    /// A fraction of a shape is negative or not finite, or none is positive.
+    #[error(
+        "fraction {share} of shape {shape} is invalid: fractions must be finite and not negative, and at least one must be positive"
+    )]
     Share {
-        /// Which shape.
+        /// Index of the shape.
         shape: usize,
-        /// Its share.
+        /// Its fraction.
         share: f64,
     },
     /// A volume fraction is not in (0, 1).
-    #[error("a volume fraction of {0} cannot be filled: it lies between 0 and 1")]
+    #[error("a volume fraction of {0} is impossible: it must lie between 0 and 1")]
     Fraction(f64),
     /// There are no particles, or the shape of one does not exist.
-    #[error("there are no particles of the given shapes, so no box holds them at a volume fraction")]
+    #[error("there are no particles of the given shapes, so no box contains them at a volume fraction")]
     Nothing,
     /// A volume is not a positive number.
     #[error("the volume {0} is not a positive finite number")]
     Volume(f64),
-    /// A histogram of number densities is not one.
+    /// A histogram of number densities is invalid.
     #[error(
-        "histogram {histogram}: {edges} edges need one number density fewer ({densities} given); edges increase from 0 or above, densities are finite and not negative"
+        "histogram {histogram} has {edges} edges and {densities} number densities: it needs one edge more than densities, increasing edges from 0 or above, and finite densities that are not negative"
     )]
     Histogram {
-        /// Which histogram.
+        /// Index of the histogram.
         histogram: usize,
-        /// Its edges.
+        /// Number of its edges.
         edges: usize,
-        /// Its densities.
+        /// Number of its densities.
         densities: usize,
     },
-    /// More particles than memory should be asked for.
-    #[error("{0:.3e} particles are too many: take a smaller box or leave the finest sizes out")]
+    /// There would be more than 10⁸ particles.
+    #[error("{0:.3e} particles are too many: use a smaller box or omit the finest sizes")]
     TooMany(f64),
 }
 
-/// Sizes of a lognormal distribution of median 1: `exp(σ z)`, z normal. Only proportions matter until the box is chosen.
+/// Sizes from a lognormal distribution of median 1: `exp(σ z)`, z normal. Only proportions matter until the box is
+/// chosen.
 ///
 /// # Errors
 ///
@@ -97,9 +100,11 @@ const SHAPES: u64 = 2;
 const PLACES: u64 = 3;
 pub(crate) const BINS: u64 = 4;
 
-/// Gives each size a shape, `shares[i]` of all to shape `i` (shares by number; they need not add up to 1), and category 0.
+/// Assigns a shape to each size: shape `i` to the number fraction `shares[i]` (fractions need not sum to 1). The
+/// category is 0.
 ///
-/// The number of each shape is exact: the share of the whole rounded down, what is missing going to the largest remainders. Which sizes get which shape is drawn.
+/// The number of each shape is its fraction of the total rounded down, plus one for the largest remainders until all
+/// sizes have a shape. Which sizes get which shape is random.
 ///
 /// # Errors
 ///
@@ -159,7 +164,7 @@ pub fn mix(sizes: &[f64], shares: &[f64], seed: u64) -> Result<Vec<Grain>, Popul
         .collect())
 }
 
-/// Volume of all grains together.
+/// Total volume of all grains.
 ///
 /// # Errors
 ///
@@ -188,7 +193,7 @@ pub fn total_volume(bodies: &[UnitBody], grains: &[Grain]) -> Result<f64, Popula
     }
 }
 
-/// The cube that the grains fill to `fraction`, exactly: the sizes stay and the box follows.
+/// The cube that the grains fill to exactly `fraction`: sizes are kept and the box is adjusted.
 ///
 /// # Errors
 ///
@@ -208,7 +213,8 @@ pub fn box_for_fraction(bodies: &[UnitBody], grains: &[Grain], fraction: f64) ->
     PeriodicBox::new(Vector3::repeat(volume.cbrt())).map_err(|_| PopulationError::Nothing)
 }
 
-/// Multiplies all sizes by one factor, which is returned, so that the grains fill `period` to `fraction` exactly: the box stays and the sizes follow.
+/// Multiplies all sizes by one factor so that the grains fill `period` to exactly `fraction`, and returns the factor:
+/// the box is kept and sizes are adjusted.
 ///
 /// # Errors
 ///
@@ -238,7 +244,7 @@ pub fn scale_to_fraction(
     Ok(factor)
 }
 
-/// How many grains like those of a sample fill `period` to `fraction`, rounded; at least one.
+/// Number of grains with the mean volume of a sample that fill `period` to `fraction`, rounded; at least one.
 ///
 /// # Errors
 ///
@@ -271,7 +277,7 @@ pub fn count_to_fill(
     }
 }
 
-/// More particles are refused before memory is asked for.
+/// Larger numbers of particles are refused before memory is allocated.
 pub(crate) const MOST: f64 = 1e8;
 
 fn checked(fraction: f64) -> Result<f64, PopulationError> {
@@ -282,9 +288,9 @@ fn checked(fraction: f64) -> Result<f64, PopulationError> {
     }
 }
 
-/// Puts every grain at a random place of the box in a random orientation, ignoring overlap: Jagnow et al. 2004, section 4.1.
+/// Places every grain at a random position in a random orientation, ignoring overlap: Jagnow et al. 2004, section 4.1.
 ///
-/// Places are uniform and orientations isotropic, the same for the same seed.
+/// Positions are uniform and orientations isotropic.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -1,37 +1,39 @@
-//! What stands for a body while it is packed.
+//! Representations of bodies while they are packed.
 
 use crate::convex_parts::ConvexParts;
 use nalgebra::{Point3, Vector3};
 use stereology_shape::{ClosedMesh, UnitBody, convex_hull};
 
-/// What stands for a mesh while it is packed. The certificate is always taken against the body itself.
+/// Representation of a mesh while it is packed. The certificate always checks the body itself.
 ///
-/// "Annealing times can also be improved by substituting simpler proxy meshes for complex particle shapes": Jagnow et al. 2004, section 5. Every proxy holds
-/// its body, so proxies that are apart are a packing.
+/// "Annealing times can also be improved by substituting simpler proxy meshes for complex particle shapes": Jagnow et
+/// al. 2004, section 5. Every proxy contains its body, so if the proxies do not overlap, the bodies do not either.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Proxy {
-    /// The body itself if it is convex, else its convex parts: particles reach into one another's hollows.
+    /// The body itself if it is convex, otherwise its convex parts: particles can enter the concavities of others.
     #[default]
     Parts,
-    /// The convex hull: hollows stay empty, and some twenty times faster.
+    /// The convex hull: about twenty times faster, but concavities stay empty.
     Hull,
-    /// The hull's outline by 26 planes, one across each direction to a corner, an edge and a face of a cube: for meshes of many thousand vertices.
+    /// The intersection of 26 half-spaces around the body, one for each direction to a corner, edge and face of a cube:
+    /// for meshes of many thousand vertices.
     Outline,
 }
 
 /// A convex part of a body, in unit coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
-    /// From the body's centroid to the part's.
+    /// Vector from the centroid of the body to that of the part.
     pub(crate) centre: Vector3<f64>,
-    /// Its vertices, about `centre`.
+    /// Vertices relative to `centre`.
     pub(crate) points: Vec<Vector3<f64>>,
-    /// The farthest of them.
+    /// Distance of the farthest vertex.
     pub(crate) reach: f64,
 }
 
-/// The parts of a body, and how far they reach together while swollen by up to a twentieth; no parts if the body stands for itself.
+/// The parts of a body and their largest distance from its centroid when swollen by up to a twentieth; no parts if the
+/// body represents itself.
 #[derive(Clone, Debug)]
 pub(crate) struct StandIn {
     pub(crate) parts: Vec<Part>,
@@ -72,7 +74,8 @@ impl Part {
 
 /// The polytope between the tangent planes of 26 directions.
 ///
-/// Found as the polar dual of the hull of the planes' poles `n / h`: each face of that hull is a corner of the outline.
+/// Computed as the polar dual of the hull of the poles `n / h` of the planes: each face of that hull is a corner of the
+/// polytope.
 fn outline(body: &UnitBody) -> Option<ClosedMesh> {
     let inner = body.mesh()?.hull();
     let middle = inner.vertices.iter().map(|v| v.coords).sum::<Vector3<f64>>() / inner.vertices.len() as f64;
@@ -81,7 +84,7 @@ fn outline(body: &UnitBody) -> Option<ClosedMesh> {
         let direction = Vector3::new(k % 3, k / 3 % 3, k / 9).map(|i| f64::from(i) - 1.0);
         if let Some(normal) = direction.try_normalize(0.5) {
             let height = normal.dot(&(body.support(&normal).coords - middle));
-            // A hair more, so that rounding leaves the body inside.
+            // Slightly enlarged, so that the body stays inside in spite of rounding.
             poles.push(Point3::from(normal / (height * (1.0 + 1e-9))));
         }
     }
@@ -104,9 +107,9 @@ mod tests {
     use nalgebra::Vector3;
     use stereology_shape::{Body, UnitBody};
 
-    /// In every direction an outline reaches as far as its body or a little farther.
+    /// In every direction an outline extends at least as far as its body and not much farther.
     #[test]
-    fn outlines_hold_their_bodies() {
+    fn outlines_contain_their_bodies() {
         for body in [
             Body::rock(4),
             Body::cylinder(1.0, 2.0).unwrap(),

@@ -1,4 +1,4 @@
-//! How often particles are found at each distance from one another.
+//! The radial distribution function.
 
 use crate::conversions::truncated;
 use crate::neighbours::Neighbours;
@@ -7,14 +7,14 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use stereology_shape::{Particle, PeriodicBox};
 
-/// What distances are measured in.
+/// Unit of distances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Distance {
-    /// From centre to centre, over the mean of the two sizes: spheres touch at 1, whatever their sizes.
+    /// Distance of centres divided by the mean of the two sizes: spheres touch at 1, whatever their sizes.
     #[default]
     Contacts,
-    /// From centre to centre, over the mean size of all particles.
+    /// Distance of centres divided by the mean size of all particles.
     Centres,
 }
 
@@ -22,24 +22,25 @@ pub enum Distance {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RadialDistribution {
-    /// Upper edges of bins of equal width; the first begins at 0. No unit.
+    /// Upper edges of bins of equal width; the first bin starts at 0. No unit.
     pub edges: Vec<f64>,
-    /// Pairs found in each bin over those that independent particles would have.
+    /// Number of pairs in each bin divided by that of independent particles.
     pub g: Vec<f64>,
-    /// Pairs found in each bin.
+    /// Number of pairs in each bin.
     pub pairs: Vec<u64>,
 }
 
-/// The radial distribution function of particles' centres, `bins` equal bins of 0 to `reach`.
+/// The radial distribution function of the centres of particles, in `bins` equal bins from 0 to `reach`.
 ///
 /// # Formula
 ///
 /// ```text
-/// g(x) = pairs in the bin / Σ over pairs (4π/3) (x₂³ − x₁³) s³ / V        s: what distances are measured in
+/// g(x) = pairs in the bin / Σ over pairs (4π/3) (x₂³ − x₁³) s³ / V        s: unit of distances
 /// ```
 ///
-/// Independent particles have g = 1. All periodic images are counted, so distances may exceed half the box. Cost: pairs within reach; an empty result for fewer
-/// than two particles or a reach that is not a positive number.
+/// Independent particles have g = 1. All periodic images are counted, so distances may exceed half the box. The result
+/// is empty for fewer than two particles or a reach that is not positive and finite. Cost: proportional to the pairs
+/// within reach.
 ///
 /// # References
 ///
@@ -51,7 +52,7 @@ pub struct RadialDistribution {
 /// use stereology_anneal::{Distance, Grain, populate, radial_distribution};
 /// use stereology_shape::PeriodicBox;
 ///
-/// // Particles dropped anywhere know nothing of each other.
+/// // Particles at random positions are independent.
 /// let period = PeriodicBox::new(nalgebra::Vector3::repeat(20.0))?;
 /// let particles = populate(&[Grain { shape: 0, size: 1.0, category: 0 }; 2000], &period, 0);
 /// let radial = radial_distribution(&particles, &period, Distance::Contacts, 4.0, 4);
@@ -93,7 +94,7 @@ pub fn radial_distribution(
                     let j = neighbour.other as usize;
                     let offset = centres[j] + neighbours.images.shift(neighbour.image) - centres[i];
                     let bin = truncated(offset.norm() / (half[i] + half[j]) / reach * bins as f64);
-                    // A particle is no neighbour of its own images.
+                    // A particle and its own image are not a pair.
                     if i != j && bin < bins {
                         found[bin] += 1;
                     }
@@ -125,12 +126,13 @@ const BLOCK: usize = 1024;
 fn cubes_of_pairs(half: &[f64]) -> f64 {
     let power = |k: i32| half.iter().map(|h| h.powi(k)).sum::<f64>();
     let (n, s1, s2, s3) = (half.len() as f64, power(1), power(2), power(3));
-    // All ordered pairs, less each with itself, halved.
+    // Half of all ordered pairs, without each particle with itself.
     0.5 * (2.0 * n * s3 + 6.0 * s1 * s2 - 8.0 * s3)
 }
 
 impl RadialDistribution {
-    /// g where spheres touch: a parabola through the bins from 1 to 1.25, continued to 1. `None` without three bins there.
+    /// g at contact: a parabola fitted to the bins from 1 to 1.25, evaluated at 1. `None` with fewer than three such
+    /// bins.
     #[must_use]
     pub fn at_contact(&self) -> Option<f64> {
         let width = self.edges.first()?;
@@ -152,7 +154,7 @@ impl RadialDistribution {
     }
 }
 
-/// g of equal hard spheres where they touch, in equilibrium at a volume fraction φ.
+/// g at contact of equal hard spheres in equilibrium at volume fraction φ.
 ///
 /// # Formula
 ///
@@ -162,7 +164,7 @@ impl RadialDistribution {
 ///
 /// # References
 ///
-/// Carnahan & Starling 1969. Good to a percent up to φ = .49, where spheres in equilibrium begin to crystallise.
+/// Carnahan & Starling 1969. Accurate to 1 % up to φ = .49, where spheres in equilibrium begin to crystallise.
 ///
 /// ```
 /// assert!((stereology_anneal::carnahan_starling(0.3) - 2.478).abs() < 1e-3);

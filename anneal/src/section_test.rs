@@ -1,4 +1,4 @@
-//! Do planes through a packing show the profiles they should?
+//! A test of the profile sizes on planes through a packing.
 
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -10,35 +10,38 @@ use crate::certificate::Packing;
 use crate::conversions::{floor, truncated};
 use crate::one_by_one::anywhere;
 
-/// What random planes through a packing show.
+/// Profiles on planes through a packing, compared with random arrangements.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SectionTest {
     /// Profiles per unit area, N_A.
     pub profiles_per_area: f64,
-    /// N_A of the same particles in random places and orientations: for convex ones Σ H / V, eq. (1) of Jagnow et al. 2004.
+    /// N_A of the same particles at random positions and orientations: Σ H / V for convex particles, eq. (1) of Jagnow
+    /// et al. 2004.
     pub expected_per_area: f64,
-    /// Profiles counted in each of the bins of size, smallest first.
+    /// Number of profiles in each size bin, smallest first.
     pub profiles: Vec<f64>,
-    /// What random places show in each bin, on average.
+    /// Mean number in each bin over the random arrangements.
     pub expected: Vec<f64>,
-    /// Σ (profiles − m)² / m, where m is the mean of the packing and all random arrangements.
+    /// Σ (profiles − m)² / m, where m is the mean over the packing and all random arrangements.
     pub statistic: f64,
-    /// Share of random arrangements whose statistic is as large, (1 + those) / (1 + all). Packed particles keep apart, so their counts vary less: large values
-    /// are usual, small ones tell that sections misrepresent the sizes.
+    /// Fraction of random arrangements whose statistic is at least as large, (1 + those) / (1 + all). Packed particles
+    /// do not overlap, so their counts vary less: large values are usual, small values show that sections misrepresent
+    /// the sizes.
     pub p_value: f64,
 }
 
 const BINS: usize = 8;
 const STREAM: u64 = 24;
 
-/// Cuts a packing by `planes` whole planes across each axis, at even depths from a random first one, and holds the sizes of the profiles against those of
-/// `replicates` random arrangements of the same particles, cut likewise.
+/// Cuts a packing by `planes` equally spaced planes perpendicular to each axis, with a random first depth, and compares
+/// the profile sizes with those of `replicates` random arrangements of the same particles, cut in the same way.
 ///
-/// The packing counts as one arrangement among the random ones when means are taken: of particles without any arrangement of their own, every rank is then as
-/// likely as any other, and `p_value` is below a number `k / (1 + replicates)` with just that probability.
+/// Means include the packing as one of the arrangements. For independent particles every rank is then equally likely,
+/// and `p_value` is at most `k / (1 + replicates)` with exactly that probability.
 ///
-/// No plane's formula is trusted: the arrangements are Monte Carlo's, so particles of any shape are judged alike. Cost: (1 + replicates) × sections.
+/// The expectation is simulated, not computed from a formula, so the test holds for particles of any shape. Cost: (1 +
+/// replicates) × sections.
 ///
 /// # Examples
 ///
@@ -105,7 +108,7 @@ pub fn section_test(packing: &Packing, planes: usize, replicates: usize, seed: u
     }
 }
 
-/// Profiles on planes across all axes, by size in equal bins up to the largest.
+/// Number of profiles on planes perpendicular to all axes, by size in equal bins up to the largest.
 fn count(
     bodies: &[UnitBody],
     particles: &[Particle],
@@ -117,8 +120,8 @@ fn count(
     let mut counts = vec![0.0; BINS];
     for axis in 0..3 {
         let side = period.sides()[axis];
-        let apart = side / planes.max(1) as f64;
-        let first = rng.random::<f64>() * apart;
+        let spacing = side / planes.max(1) as f64;
+        let first = rng.random::<f64>() * spacing;
         let mut world = Vector3::zeros();
         world[axis] = 1.0;
         let world = nalgebra::UnitVector3::new_unchecked(world);
@@ -126,10 +129,10 @@ fn count(
             let body = &bodies[particle.shape];
             let normal = particle.orientation.inverse() * world;
             let reach = body.bounding_radius() * particle.size;
-            let from = -floor(-(particle.position[axis] - reach - first) / apart);
-            let to = floor((particle.position[axis] + reach - first) / apart);
+            let from = -floor(-(particle.position[axis] - reach - first) / spacing);
+            let to = floor((particle.position[axis] + reach - first) / spacing);
             for plane in from..=to {
-                let height = first + plane as f64 * apart - particle.position[axis];
+                let height = first + plane as f64 * spacing - particle.position[axis];
                 for area in body.profile_areas(&normal, height / particle.size) {
                     let size = (4.0 * area / std::f64::consts::PI).sqrt() * particle.size;
                     counts[truncated(size / largest * BINS as f64).min(BINS - 1)] += 1.0;

@@ -1,17 +1,19 @@
-//! The separating-axis test: for polytopes that a search cannot settle, every direction that could part them.
+//! The separating-axis test: all directions that can separate two polytopes, for pairs that the search does not decide.
 
 use crate::difference::{Posed, Solid};
 use crate::gauge::Gauge;
 use nalgebra::Vector3;
 
-/// Largest quotient `n·d / (h_A(n) + h_B(−n))` over all face normals of both hulls and all cross products of their edges, and its direction.
+/// Largest quotient `n·d / (h_A(n) + h_B(−n))` over all face normals of both hulls and all cross products of their
+/// edges, and its direction.
 ///
-/// For two polytopes this is the exact gauge: the difference body has no other faces. `None` if a body is no mesh. Cost: edges × edges.
+/// For two polytopes this is the exact gauge, because the difference body has no other faces. `None` if a body is not a
+/// mesh. Cost: edges × edges.
 pub(crate) fn best_axis(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
     let of_a = Directions::of(a)?;
     let of_b = Directions::of(b)?;
     let mut best = (f64::NEG_INFINITY, Vector3::zeros());
-    let mut ask = |axis: Vector3<f64>| {
+    let mut evaluate = |axis: Vector3<f64>| {
         let Some(axis) = axis.try_normalize(1e-12) else { return };
         let axis = if axis.dot(d) < 0.0 { -axis } else { axis };
         let (value, _) = Gauge::along(a, b, d, &axis);
@@ -19,19 +21,19 @@ pub(crate) fn best_axis(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>) -> Optio
             best = (value, axis);
         }
     };
-    of_a.faces.iter().chain(&of_b.faces).copied().for_each(&mut ask);
+    of_a.faces.iter().chain(&of_b.faces).copied().for_each(&mut evaluate);
     for e in &of_a.edges {
         for f in &of_b.edges {
-            ask(e.cross(f));
+            evaluate(e.cross(f));
         }
     }
     Some(best)
 }
 
-/// The least depth of an overlap across the faces of two hulls; `None` if a body is no mesh or one of many faces.
+/// The least depth of an overlap along the face normals of two hulls; `None` if a body is not a mesh or has many faces.
 ///
-/// Where the line of centres leaves the difference body through an edge or a corner, as it does for aligned cubes, many directions have the same quotient and not the
-/// same depth; the least is that of a face. Cost: faces × vertices.
+/// Where the line of centres leaves the difference body through an edge or a corner, as for aligned cubes, many
+/// directions have the same quotient but different depths; the least depth is that of a face. Cost: faces × vertices.
 pub(crate) fn depth_across_faces(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>) -> Option<f64> {
     const FACES: usize = 200;
     let mut least = f64::INFINITY;
@@ -54,7 +56,7 @@ pub(crate) fn depth_across_faces(a: &Posed<'_>, b: &Posed<'_>, d: &Vector3<f64>)
     Some(least)
 }
 
-/// Face normals and edge directions of a hull in world axes, parallel ones once.
+/// Face normals and edge directions of a hull in world axes, without parallel duplicates.
 struct Directions {
     faces: Vec<Vector3<f64>>,
     edges: Vec<Vector3<f64>>,
@@ -104,7 +106,7 @@ mod tests {
         steps: 200,
     };
 
-    /// The portal search and the separating axes are two ways to one number, deep inside or far apart.
+    /// The portal search and the separating axes give the same number, for deep overlaps and for separate bodies.
     #[test]
     fn searching_finds_the_best_axis() {
         let bodies = [Body::rock(1), Body::rock(2), Body::cuboid([1.0, 2.0, 0.3]).unwrap()];
@@ -135,7 +137,8 @@ mod tests {
         }
     }
 
-    /// Aligned cubes, where the ray meets corners and edges of the difference body.
+    /// For aligned cubes the ray meets corners and edges of the difference body, and the gauge is the largest
+    /// component.
     #[test]
     fn aligned_cubes_have_the_largest_component() {
         let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
@@ -154,7 +157,7 @@ mod tests {
         }
     }
 
-    /// The points at which shrunken bodies meet are the same point of the world.
+    /// The contact points of both shrunken bodies coincide in world coordinates.
     #[test]
     fn bodies_meet_in_one_point() {
         let rock = UnitBody::new(&Body::rock(5));

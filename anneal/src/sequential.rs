@@ -1,9 +1,11 @@
-//! The naive way: "add one particle at a time, randomly testing orientations and translations until sufficient vacant space is found".
+//! Random sequential addition: "add one particle at a time, randomly testing orientations and translations until
+//! sufficient vacant space is found".
 //!
 //! # References
 //!
-//! Jagnow, Dorsey & Rushmeier 2004, section 4.1, which dismisses it: "this method fills space inefficiently and works only for loosely packed volumes". Random
-//! sequential addition of equal spheres ends at a fraction of .384 (Torquato 2002); the largest first, as here, lognormal sizes come a little further.
+//! Jagnow, Dorsey & Rushmeier 2004, section 4.1, which dismisses it: "this method fills space inefficiently and works
+//! only for loosely packed volumes". Random sequential addition of equal spheres ends at a fraction of .384 (Torquato
+//! 2002); lognormal sizes, with the largest first as here, reach slightly more.
 
 use crate::assembly::Assembly;
 use crate::one_by_one::{OneByOne, anywhere};
@@ -12,13 +14,13 @@ use rand_chacha::ChaCha8Rng;
 use stereology_metrics::Progress;
 use stereology_shape::{PeriodicBox, isotropic_rotation};
 
-/// How a filling ended.
+/// How the addition ended.
 pub(crate) enum Filling {
     Complete {
         /// Positions tried for all particles together.
         tries: usize,
     },
-    /// These have found a place, in order of size; the next has not.
+    /// `placed` have a position, in order of size; `next` found none.
     Jammed {
         placed: Vec<usize>,
         next: usize,
@@ -46,7 +48,7 @@ pub(crate) fn fill(
         }
         let found = (0..tries_each).any(|try_number| {
             tries += 1;
-            // The first try is where the particle was given.
+            // The first try is the given position.
             if try_number > 0 {
                 let centre = anywhere(&mut rng, period);
                 let rotation = isotropic_rotation(&mut rng);
@@ -65,6 +67,7 @@ pub(crate) fn fill(
     Filling::Complete { tries }
 }
 
-/// Particles keep this much clear of each other, so that rounding leaves the certificate nothing to find.
+/// Particles keep a relative distance of this factor, so that rounding cannot produce an overlap that the certificate
+/// finds.
 pub(crate) const CLEARANCE: f64 = 1.0 + 1e-8;
 const STREAM: u64 = 21;

@@ -1,12 +1,13 @@
-//! Bodies that are not convex, as they are: faces against faces, and who is inside whom.
+//! Overlap of bodies that are not convex: crossing faces, and bodies inside one another.
 //!
-//! Two solids share no inner point if no faces of their surfaces cross and neither surface lies inside the other solid. A pair of triangles is proved apart by one
-//! of the 17 directions in which two triangles can be separated (their normals, the cross products of their edges, the normals of their edges in their planes); a
-//! triangle and an ellipsoid by the search for convex bodies; a solid and a sphere by the distance of the sphere's centre. Which side a surface lies on is decided
-//! exactly, for a vertex of each of its pieces.
+//! Two solids share no interior point if no faces of their surfaces cross and neither surface lies inside the other
+//! solid. Two triangles are proved separate by one of 17 directions (their normals, the cross products of their edges,
+//! the normals of their edges in their planes); a triangle and an ellipsoid by the search for convex bodies; a solid
+//! and a sphere by the distance of the centre of the sphere. Whether a surface lies inside is decided exactly, for one
+//! vertex of each of its connected components.
 //!
-//! Surfaces that touch, within rounding, may hide an overlap without any crossing (two L that share a plane): then every face is asked at four points a hair
-//! below it.
+//! Surfaces that touch within rounding may overlap without any crossing (two L that share a plane): then four points
+//! slightly below every face are tested as well.
 
 use crate::conversions::compact;
 use crate::difference::{Posed, Solid};
@@ -16,32 +17,32 @@ use stereology_shape::{BodyKind, UnitBody};
 
 /// Allowance for the rounding of coordinates.
 const ROUNDING: f64 = 1e-12;
-/// How far below a face it is asked whether it is inside another body, in sizes.
+/// Depth of these points below their face, in sizes.
 const BELOW: f64 = 1e-7;
 
-/// The faces of a body in a tree of balls, which turn with the body at no cost.
+/// The faces of a body in a tree of bounding spheres, which are invariant under rotation of the body.
 #[derive(Debug)]
 pub(crate) struct Surface {
     triangles: Vec<[Vector3<f64>; 3]>,
-    balls: Vec<Ball>,
-    /// A vertex of each connected piece of the surface.
+    spheres: Vec<Bound>,
+    /// A vertex of each connected component of the surface.
     witnesses: Vec<Vector3<f64>>,
 }
 
 #[derive(Debug)]
-struct Ball {
+struct Bound {
     centre: Vector3<f64>,
     radius: f64,
-    /// First triangle of a leaf, or the second child; the first child follows its parent.
+    /// First triangle of a leaf, or index of the second child; the first child follows its parent.
     start: usize,
-    /// Number of triangles of a leaf, else 0.
+    /// Number of triangles of a leaf, 0 for a node.
     count: usize,
 }
 
 const LEAF: usize = 4;
 
 impl Surface {
-    /// Of a body that has a mesh.
+    /// The surface of a body that is a mesh.
     pub(crate) fn of(body: &UnitBody) -> Option<Self> {
         let mesh = body.mesh()?.as_triangle_mesh();
         let mut triangles: Vec<[Vector3<f64>; 3]> = mesh
@@ -61,11 +62,11 @@ impl Surface {
         used.sort_unstable();
         used.dedup();
         let witnesses = used.iter().map(|&v| mesh.vertices[v as usize].coords).collect();
-        let mut balls = Vec::new();
-        split(&mut balls, &mut triangles, 0);
+        let mut spheres = Vec::new();
+        split(&mut spheres, &mut triangles, 0);
         Some(Self {
             triangles,
-            balls,
+            spheres,
             witnesses,
         })
     }
@@ -79,7 +80,7 @@ fn first(piece: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-fn split(balls: &mut Vec<Ball>, triangles: &mut [[Vector3<f64>; 3]], start: usize) {
+fn split(spheres: &mut Vec<Bound>, triangles: &mut [[Vector3<f64>; 3]], start: usize) {
     let corner = triangles[0][0];
     let (low, high) = triangles
         .iter()
@@ -91,9 +92,9 @@ fn split(balls: &mut Vec<Ball>, triangles: &mut [[Vector3<f64>; 3]], start: usiz
         .flatten()
         .map(|p| (p - centre).norm())
         .fold(0.0, f64::max);
-    let at = balls.len();
+    let at = spheres.len();
     let count = if triangles.len() <= LEAF { triangles.len() } else { 0 };
-    balls.push(Ball {
+    spheres.push(Bound {
         centre,
         radius,
         start,
@@ -107,12 +108,12 @@ fn split(balls: &mut Vec<Ball>, triangles: &mut [[Vector3<f64>; 3]], start: usiz
     let key = |t: &[Vector3<f64>; 3]| t.iter().map(|p| p[axis]).sum::<f64>();
     triangles.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
     let (left, right) = triangles.split_at_mut(middle);
-    split(balls, left, start);
-    balls[at].start = balls.len();
-    split(balls, right, start + middle);
+    split(spheres, left, start);
+    spheres[at].start = spheres.len();
+    split(spheres, right, start + middle);
 }
 
-/// One particle: its body, its surface if that is a mesh, its pose.
+/// A particle: its body, its surface if it is a mesh, its size and orientation.
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'a> {
     pub(crate) body: &'a UnitBody,
@@ -122,7 +123,7 @@ pub(crate) struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    /// The body, or its hull, as one convex solid.
+    /// The body or its convex hull, as one convex solid.
     pub(crate) fn hull(&self) -> Posed<'a> {
         Posed {
             solid: Solid::Body(self.body),
@@ -140,24 +141,25 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// 0 if two bodies, at least one a mesh, are proved apart; else how deep the deepest crossing face or enclosed point is, never less than the least number.
+/// 0 if two bodies, at least one of them a mesh, are proved separate; otherwise the depth of the deepest crossing face
+/// or enclosed point, always positive.
 ///
-/// `offset` leads from the centroid of `a` to that of `b`.
+/// `offset` is the vector from the centroid of `a` to that of `b`.
 pub(crate) fn depth(a: &Placed<'_>, b: &Placed<'_>, offset: &Vector3<f64>) -> f64 {
     let depth = match (a.surface, b.surface) {
-        (Some(_), _) if b.is_sphere() => in_the_way(a, b, offset),
-        (_, Some(_)) if a.is_sphere() => in_the_way(b, a, &-offset),
+        (Some(_), _) if b.is_sphere() => with_sphere(a, b, offset),
+        (_, Some(_)) if a.is_sphere() => with_sphere(b, a, &-offset),
         (Some(of_a), Some(of_b)) => between_meshes(a, of_a, b, of_b, offset),
         (Some(of_a), None) => with_ellipsoid(a, of_a, b, offset),
         (None, Some(of_b)) => with_ellipsoid(b, of_b, a, &-offset),
-        // Callers ask for meshes only; what is not proved apart counts as overlapping.
+        // Callers pass at least one mesh; pairs not proved separate count as overlapping.
         (None, None) => Some(f64::MIN_POSITIVE),
     };
     depth.map_or(0.0, |depth| depth.max(f64::MIN_POSITIVE))
 }
 
-/// A sphere in the way of a mesh.
-fn in_the_way(mesh: &Placed<'_>, sphere: &Placed<'_>, offset: &Vector3<f64>) -> Option<f64> {
+/// Depth of the overlap of a mesh and a sphere.
+fn with_sphere(mesh: &Placed<'_>, sphere: &Placed<'_>, offset: &Vector3<f64>) -> Option<f64> {
     let distance = mesh.body.signed_distance(&mesh.to_local(offset)) * mesh.size;
     let radius = 0.5 * sphere.size;
     let allowance = ROUNDING * (mesh.size * mesh.body.bounding_radius() + radius);
@@ -175,16 +177,16 @@ fn with_ellipsoid(mesh: &Placed<'_>, surface: &Surface, round: &Placed<'_>, offs
     let mut deepest: Option<f64> = None;
     let mut stack = vec![0];
     while let Some(at) = stack.pop() {
-        let ball = &surface.balls[at];
-        let centre = mesh.rotation * ball.centre * mesh.size - offset;
-        if centre.norm() > ball.radius * mesh.size + reach {
+        let sphere = &surface.spheres[at];
+        let centre = mesh.rotation * sphere.centre * mesh.size - offset;
+        if centre.norm() > sphere.radius * mesh.size + reach {
             continue;
         }
-        if ball.count == 0 {
-            stack.extend([at + 1, ball.start]);
+        if sphere.count == 0 {
+            stack.extend([at + 1, sphere.start]);
             continue;
         }
-        for corners in &surface.triangles[ball.start..ball.start + ball.count] {
+        for corners in &surface.triangles[sphere.start..sphere.start + sphere.count] {
             let middle = corners.iter().sum::<Vector3<f64>>() / 3.0;
             let points = corners.map(|p| p - middle);
             let triangle = Posed {
@@ -203,7 +205,7 @@ fn with_ellipsoid(mesh: &Placed<'_>, surface: &Surface, round: &Placed<'_>, offs
             }
         }
     }
-    // With no face in its way the ellipsoid is inside or outside as a whole.
+    // An ellipsoid that crosses no face is inside or outside as a whole.
     let local = mesh.to_local(offset);
     if mesh.body.contains(&local) {
         let depth = -mesh.body.signed_distance(&local) * mesh.size;
@@ -212,7 +214,7 @@ fn with_ellipsoid(mesh: &Placed<'_>, surface: &Surface, round: &Placed<'_>, offs
     deepest
 }
 
-/// Where a walk down two trees has come.
+/// Result of the traversal of two trees.
 struct Crossings {
     deepest: Option<f64>,
     touching: bool,
@@ -225,7 +227,7 @@ fn between_meshes(
     of_b: &Surface,
     offset: &Vector3<f64>,
 ) -> Option<f64> {
-    // In the axes of `a`, whose own faces are only scaled.
+    // In the axes of `a`, whose faces are only scaled.
     let turn = a.rotation.tr_mul(b.rotation);
     let offset_a = a.rotation.tr_mul(offset);
     let allowance = ROUNDING * (a.size * a.body.bounding_radius() + b.size * b.body.bounding_radius());
@@ -235,7 +237,7 @@ fn between_meshes(
     };
     let mut stack = vec![(0, 0)];
     while let Some((i, j)) = stack.pop() {
-        let (p, q) = (&of_a.balls[i], &of_b.balls[j]);
+        let (p, q) = (&of_a.spheres[i], &of_b.spheres[j]);
         let between = offset_a + turn * q.centre * b.size - p.centre * a.size;
         let (reach_p, reach_q) = (p.radius * a.size, q.radius * b.size);
         if between.norm() > reach_p + reach_q + allowance {
@@ -261,21 +263,21 @@ fn between_meshes(
         }
     }
     let mut deepest = found.deepest;
-    let mut ask = |depth: Option<f64>| {
+    let mut include = |depth: Option<f64>| {
         if let Some(depth) = depth {
             deepest = Some(deepest.unwrap_or(0.0).max(depth));
         }
     };
-    ask(enclosed(a, of_a, b, offset, found.touching));
-    ask(enclosed(b, of_b, a, &-offset, found.touching));
+    include(enclosed(a, of_a, b, offset, found.touching));
+    include(enclosed(b, of_b, a, &-offset, found.touching));
     deepest
 }
 
-/// How deep inside `b` the witnesses of `a` are; where surfaces touch, points just below all faces of `a` too.
+/// Depth inside `b` of the witnesses of `a`, and, if the surfaces touch, of points slightly below all faces of `a`.
 fn enclosed(a: &Placed<'_>, of_a: &Surface, b: &Placed<'_>, offset: &Vector3<f64>, touching: bool) -> Option<f64> {
     let mut deepest: Option<f64> = None;
     let reach = b.size * b.body.bounding_radius();
-    let mut ask = |p: &Vector3<f64>, least: f64| {
+    let mut test = |p: &Vector3<f64>, least: f64| {
         let from_b = a.rotation * p * a.size - offset;
         if from_b.norm_squared() > reach * reach {
             return;
@@ -289,7 +291,7 @@ fn enclosed(a: &Placed<'_>, of_a: &Surface, b: &Placed<'_>, offset: &Vector3<f64
         }
     };
     let rounding = ROUNDING * (a.size + b.size);
-    of_a.witnesses.iter().for_each(|p| ask(p, rounding));
+    of_a.witnesses.iter().for_each(|p| test(p, rounding));
     if touching {
         for [p, q, r] in &of_a.triangles {
             let Some(normal) = (q - p).cross(&(r - p)).try_normalize(0.0) else {
@@ -302,22 +304,23 @@ fn enclosed(a: &Placed<'_>, of_a: &Surface, b: &Placed<'_>, offset: &Vector3<f64
                 0.4 * middle + 0.6 * q,
                 0.4 * middle + 0.6 * r,
             ] {
-                ask(&(point - normal * BELOW), 0.5 * BELOW * a.size.min(b.size));
+                test(&(point - normal * BELOW), 0.5 * BELOW * a.size.min(b.size));
             }
         }
     }
     deepest
 }
 
-/// The widest gap between two triangles over all directions that can part them; negative: how deep they cross.
+/// The widest gap between two triangles over all directions that can separate them; negative if they cross, then minus
+/// the depth.
 fn gap(s: &[Vector3<f64>; 3], t: &[Vector3<f64>; 3]) -> f64 {
     let edges = |c: &[Vector3<f64>; 3]| [c[1] - c[0], c[2] - c[1], c[0] - c[2]];
     let (of_s, of_t) = (edges(s), edges(t));
     let (normal_s, normal_t) = (of_s[0].cross(&of_s[1]), of_t[0].cross(&of_t[1]));
     let mut widest = f64::NEG_INFINITY;
-    let mut ask = |axis: Vector3<f64>, scale: f64| {
+    let mut project = |axis: Vector3<f64>, scale: f64| {
         let length = axis.norm();
-        // Parallel edges have no cross product worth its rounding.
+        // The cross product of parallel edges consists of rounding errors.
         if length > 1e-9 * scale {
             let range = |c: &[Vector3<f64>; 3]| {
                 let h = c.map(|p| axis.dot(&p));
@@ -327,16 +330,16 @@ fn gap(s: &[Vector3<f64>; 3], t: &[Vector3<f64>; 3]) -> f64 {
             widest = widest.max((low_t - high_s).max(low_s - high_t) / length);
         }
     };
-    ask(normal_s, 0.0);
-    ask(normal_t, 0.0);
+    project(normal_s, 0.0);
+    project(normal_t, 0.0);
     for e in &of_s {
-        ask(e.cross(&normal_s), 0.0);
+        project(e.cross(&normal_s), 0.0);
         for f in &of_t {
-            ask(e.cross(f), e.norm() * f.norm());
+            project(e.cross(f), e.norm() * f.norm());
         }
     }
     for f in &of_t {
-        ask(f.cross(&normal_t), 0.0);
+        project(f.cross(&normal_t), 0.0);
     }
     widest
 }

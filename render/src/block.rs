@@ -17,7 +17,8 @@ pub struct BlockOptions {
 }
 
 impl Default for BlockOptions {
-    /// 800 × 800 pixels with 3 × 3 samples each, on white, seen from above a corner, without gloss: the top keeps its colours, the sides are slightly shaded.
+    /// 800 × 800 pixels with 3 × 3 samples each, on white, seen from above a corner, without gloss: the top keeps its
+    /// colours, the sides are slightly shaded.
     fn default() -> Self {
         let camera = Camera {
             azimuth: 38.0,
@@ -54,7 +55,8 @@ impl BlockOptions {
     }
 }
 
-/// Renders the box from the origin to `sides`: its top and two sides, with the colour that `colour` gives at each point (sRGB-encoded values / 255).
+/// Renders the box from the origin to `sides`: its top and two sides, with the colour that `colour` gives at each point
+/// (sRGB-encoded values / 255).
 ///
 /// # Errors
 ///

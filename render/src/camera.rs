@@ -16,9 +16,11 @@ pub struct Camera {
     pub azimuth: f64,
     /// Degrees above the horizon, −89 to 89.
     pub elevation: f64,
-    /// Distance from the camera to the centre of the object, in its unit of length; `None`: the nearest from which all of it is visible.
+    /// Distance from the camera to the centre of the object, in its unit of length; `None`: the nearest from which all
+    /// of it is visible.
     pub distance: Option<f64>,
-    /// Field of view along the shorter side of the image, in degrees, 1 to 120; with automatic distance small angles place the camera far away.
+    /// Field of view along the shorter side of the image, in degrees, 1 to 120; with automatic distance small angles
+    /// place the camera far away.
     pub field_of_view: f64,
     /// The direction that is up in the image; y in most mesh files, z in a solid.
     pub up: UnitVector3<f64>,
@@ -185,8 +187,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// At the automatic distance every point lies within the fraction of the image that the object may fill, and reaches it along one axis unless the
-        /// camera would touch the object.
+        /// At the automatic distance every point lies within the fraction of the image that the object may fill, and
+        /// reaches it along one axis unless the camera would touch the object.
         #[test]
         fn all_is_visible(
             mut points in prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64).prop_map(Point3::from), 1..20),

@@ -1,8 +1,8 @@
 //! Bounding volume hierarchy of triangles with four children per node, in single precision.
 //!
-//! The tree is built by the crate `bvh` (surface area heuristic); every second level of it is removed, so that a ray tests four
-//! boxes at once. Boxes are enlarged by more than the rounding error of a ray, so no box that a ray touches is missed; the caller
-//! tests the triangles in double precision.
+//! The tree is built by the crate `bvh` (surface area heuristic); every second level of it is removed, so that a ray
+//! tests four boxes at once. Boxes are enlarged by more than the rounding error of a ray, so no box that a ray touches
+//! is missed; the caller tests the triangles in double precision.
 
 use bvh::aabb::{Aabb, Bounded};
 use bvh::bounding_hierarchy::BHShape;
@@ -81,7 +81,8 @@ impl Hierarchy {
         hierarchy
     }
 
-    /// Adds a node of the binary tree together with its grandchildren at level `floor`; returns the number of the new node.
+    /// Adds a node of the binary tree together with its grandchildren at level `floor`; returns the number of the new
+    /// node.
     #[allow(clippy::cast_possible_truncation, reason = "meshes have fewer than 2^31 triangles")]
     fn take(&mut self, tree: &[BvhNode<f64, 3>], facets: &[Facet], root: usize, floor: usize) -> u32 {
         // A traversal replaces a node on the stack by up to four children.
@@ -131,8 +132,8 @@ impl Hierarchy {
 
     /// Visits the triangles whose boxes a ray meets between its origin and `far`, near boxes first.
     ///
-    /// `visit` returns the new limit of the distance, or `None` to end. `direction` has length 1; a ray with NaN or infinite
-    /// coordinates meets nothing.
+    /// `visit` returns the new limit of the distance, or `None` to end. `direction` has length 1; a ray with NaN or
+    /// infinite coordinates meets nothing.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "boxes have a margin for single precision"
@@ -205,7 +206,8 @@ impl Node {
             let back = usize::from(by < 0.0);
             let (first, last) = (&self.sides[axis][back], &self.sides[axis][1 - back]);
             let along = |sides: &[f32; 4]| sides.map(|side| (side - from) * by);
-            // A ray in the plane of a side gives 0 · ∞ = NaN, which compares false: such a side does not bound the interval.
+            // A ray in the plane of a side gives 0 · ∞ = NaN, which compares false: such a side does not bound the
+            // interval.
             near = larger(along(first), near);
             end = smaller(along(last), end);
         }

@@ -1,23 +1,24 @@
 //! Rendering of blocks and meshes whose colour is a function of the point.
 //!
-//! Any function that gives a colour at a point of space can be rendered: [`render_block`] shows three faces of a box, as the paper
-//! shows its solids; [`render_mesh`] shows any triangle mesh carved from the solid. The function is evaluated only where a ray meets
-//! the surface, so a solid of any resolution needs no memory here.
+//! Any function that gives a colour at a point of space can be rendered: [`render_block`] shows three faces of a box,
+//! as the paper shows its solids; [`render_mesh`] shows any triangle mesh carved from the solid. The function is
+//! evaluated only where a ray meets the surface, so a solid of any resolution needs no memory here.
 //!
-//! The lighting is that of a studio: a key light with soft shadows, a sky, and a grey ground that reflects light. Light is traced
-//! from surface to surface until it leaves the scene, so cavities take on the colour of their walls. Colours are sRGB-encoded values
-//! / 255, are converted to linear light for shading, and converted back:
+//! The lighting is that of a studio: a key light with soft shadows, a sky, and a grey ground that reflects light. Light
+//! is traced from surface to surface until it leaves the scene, so cavities take on the colour of their walls. Colours
+//! are sRGB-encoded values / 255, are converted to linear light for shading, and converted back:
 //!
 //! ```text
 //! E(p, n) = key · n·l · V_key + ∫ L(p, ω) n·ω dω / π          L = sky(ω), or at a surface: linear(colour) · E
 //! pixel   = encode( (1 − F) · linear(colour) · E / E₀ + F · L(mirrored) )
 //! ```
 //!
-//! V is the visibility of the key light, F the Fresnel term of a clear coat (0 without one), and E₀ the light on an unobstructed face
-//! that points up: such a face keeps its colour to the byte, so an image can be compared with the photograph. The integrals are
-//! estimated by path tracing, without bias at 8 × 8 samples per pixel. With fewer, the light (not the colour) is averaged over nearby
-//! samples of the same surface, which gives soft shadows without noise. [`sky_map`] exports the lighting to other renderers; images
-//! agree with Mitsuba within one grey level. The bytes do not depend on the number of threads.
+//! V is the visibility of the key light, F the Fresnel term of a clear coat (0 without one), and E₀ the light on an
+//! unobstructed face that points up: such a face keeps its colour to the byte, so an image can be compared with the
+//! photograph. The integrals are estimated by path tracing, without bias at 8 × 8 samples per pixel. With fewer, the
+//! light (not the colour) is averaged over nearby samples of the same surface, which gives soft shadows without noise.
+//! [`sky_map`] exports the lighting to other renderers; images agree with Mitsuba within one grey level. The bytes do
+//! not depend on the number of threads.
 //!
 //! # A block of marble
 //!
@@ -49,8 +50,9 @@
 //!
 //! # Rejected alternatives
 //!
-//! Rasterising with shadow maps (cavities look flat); ambient occlusion with constant reflected light (cavities are grey whatever their
-//! colour); light baked into vertices (coarse meshes have too few vertices where the light changes).
+//! Rasterising with shadow maps (cavities look flat); ambient occlusion with constant reflected light (cavities are
+//! grey whatever their colour); light baked into vertices (coarse meshes have too few vertices where the light
+//! changes).
 
 mod block;
 mod camera;

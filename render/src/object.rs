@@ -26,7 +26,8 @@ pub(crate) struct Object<'a> {
 
 /// A ray stops this fraction of the extent before a wall.
 const NEAR: f64 = 1e-5;
-/// Maximum number of steps to a wall. Each step is the distance to the nearest wall, so only rays along a wall need many.
+/// Maximum number of steps to a wall. Each step is the distance to the nearest wall, so only rays along a wall need
+/// many.
 const MOST_STEPS: usize = 256;
 /// Maximum number of openings of voids that one ray passes.
 const MOST_OPENINGS: usize = 64;

@@ -106,7 +106,8 @@ impl World<'_> {
         }
     }
 
-    /// Radiance from a direction without the key light itself: the sky, or a surface lit by the key light and by other surfaces.
+    /// Radiance from a direction without the key light itself: the sky, or a surface lit by the key light and by other
+    /// surfaces.
     ///
     /// One path of the rendering equation (Kajiya 1986), ended by Russian roulette.
     fn radiance(&self, mut start: Start, mut direction: Vector3<f64>, chance: &mut Chance) -> Rgb {
@@ -137,9 +138,11 @@ impl World<'_> {
         }
     }
 
-    /// Light that a clear coat reflects towards the viewer, and the fraction of light that it keeps from the surface below.
+    /// Light that a clear coat reflects towards the viewer, and the fraction of light that it keeps from the surface
+    /// below.
     ///
-    /// Schlick's approximation of the Fresnel term, 4 % at normal incidence; the disc of the key light is slightly blurred.
+    /// Schlick's approximation of the Fresnel term, 4 % at normal incidence; the disc of the key light is slightly
+    /// blurred.
     pub(crate) fn coat(
         &self,
         start: &Start,
@@ -213,7 +216,8 @@ mod tests {
             )
         };
         let away = -(world.studio.key.into_inner() - world.studio.key.z * Vector3::z()).normalize();
-        // Half of the light of the horizon, (z − h) ∫ sin² of the elevation over half of the sky, half of the light of the ground.
+        // Half of the light of the horizon, (z − h) ∫ sin² of the elevation over half of the sky, half of the light of
+        // the ground.
         let (horizon, zenith, ground) = (0.42, 0.5, 0.36);
         let level = 0.5 * horizon + (zenith - horizon) * 2.0 / (3.0 * PI) + 0.5 * ground;
         for (normal, expected) in [(Vector3::z(), 1.0), (-Vector3::z(), ground), (away, level)] {
@@ -221,7 +225,8 @@ mod tests {
         }
     }
 
-    /// Light reflected once or more reaches the floor of a deep well in the colour of its walls, and not at all if they are black.
+    /// Light reflected once or more reaches the floor of a deep well in the colour of its walls, and not at all if they
+    /// are black.
     #[test]
     fn walls_colour_the_light_of_a_cavity() {
         let slab = |low: [f64; 3], high: [f64; 3]| {

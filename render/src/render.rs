@@ -114,10 +114,10 @@ pub enum RenderError {
 
 /// Renders a mesh whose colour is a function of the point.
 ///
-/// `colour` receives points of the surface in the mesh's coordinates and returns sRGB-encoded values / 255. The mesh need not be
-/// closed; facets that meet at less than 35° are shaded as one smooth surface. Cost: about 5 rays per sample of the object or its
-/// ground, a microsecond or less each; seconds for a million pixels with 2 × 2 samples, half a minute with 8 × 8. The bytes do not
-/// depend on the number of threads.
+/// `colour` receives points of the surface in the mesh's coordinates and returns sRGB-encoded values / 255. The mesh
+/// need not be closed; facets that meet at less than 35° are shaded as one smooth surface. Cost: about 5 rays per
+/// sample of the object or its ground, a microsecond or less each; seconds for a million pixels with 2 × 2 samples,
+/// half a minute with 8 × 8. The bytes do not depend on the number of threads.
 ///
 /// # Errors
 ///
@@ -169,8 +169,9 @@ impl<'a> Material<'a> {
 
     /// Adds voids, which the mesh cuts open.
     ///
-    /// `distance` returns the signed distance to the nearest surface of a void: negative inside, never more than the true
-    /// distance, infinite where there is no void. The wall of a void has the colour a little behind it. The mesh should be closed.
+    /// `distance` returns the signed distance to the nearest surface of a void: negative inside, never more than the
+    /// true distance, infinite where there is no void. The wall of a void has the colour a little behind it. The mesh
+    /// should be closed.
     #[must_use]
     pub fn with_voids(self, distance: &'a (dyn Fn(&Point3<f64>) -> f64 + Sync)) -> Self {
         Self {

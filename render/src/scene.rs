@@ -130,7 +130,8 @@ mod tests {
     }
 
     proptest! {
-        /// The hit found through the hierarchy is the nearest of all triangles, and lies on the sphere within the sagitta of the facets.
+        /// The hit found through the hierarchy is the nearest of all triangles, and lies on the sphere within the
+        /// sagitta of the facets.
         #[test]
         fn the_first_hit_is_the_nearest(from in vector(3.0), to in vector(0.9), axis in 0_usize..4) {
             let ball = TriangleMesh::icosphere(2.0, 3);
@@ -152,7 +153,8 @@ mod tests {
         }
     }
 
-    /// Triangles that shrink towards a corner make a deep tree; rays through it find the same hits as a search of all triangles.
+    /// Triangles that shrink towards a corner make a deep tree; rays through it find the same hits as a search of all
+    /// triangles.
     #[test]
     fn deep_trees_are_searched_to_the_end() {
         let mut mesh = TriangleMesh::default();

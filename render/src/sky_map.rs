@@ -11,9 +11,10 @@ const SAMPLES: u32 = 8;
 
 /// The light around an object seen by `camera`, without the ground plane, as an equirectangular map of linear radiance.
 ///
-/// A column at fraction u of the width has azimuth 360° u, counted as for the position of the camera; a row at fraction v of the
-/// height has elevation 90° − 180° v. A face that points up receives ∫ L cos θ dω / π = 1, as in Blender, Mitsuba and pbrt, which
-/// then show what [`render_mesh`](crate::render_mesh) shows with `ground` false and `gloss` 0. Cost: 64 samples per pixel.
+/// A column at fraction u of the width has azimuth 360° u, counted as for the position of the camera; a row at fraction
+/// v of the height has elevation 90° − 180° v. A face that points up receives ∫ L cos θ dω / π = 1, as in Blender,
+/// Mitsuba and pbrt, which then show what [`render_mesh`](crate::render_mesh) shows with `ground` false and `gloss` 0.
+/// Cost: 64 samples per pixel.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! Rendering of a tile: samples are traced, light is averaged over nearby samples of the same surface, samples become pixels.
+//! Rendering of a tile: samples are traced, light is averaged over nearby samples of the same surface, samples become
+//! pixels.
 
 use crate::camera::View;
 use crate::light::single;
@@ -70,7 +71,8 @@ impl Rendering<'_> {
         pixels
     }
 
-    /// Number of samples before a sample in its square; the square has one fewer after it. A pixel with a full square needs no neighbours.
+    /// Number of samples before a sample in its square; the square has one fewer after it. A pixel with a full square
+    /// needs no neighbours.
     fn reach(&self) -> usize {
         if (self.samples as usize) < SQUARE {
             SQUARE / 2
@@ -150,7 +152,8 @@ impl Rendering<'_> {
         }
         let (light, shine) = (light / count, shine / count);
         if own.kind == Kind::Ground {
-            // The ground shows only a shadow on the background: in full light it is the background, and far away there is no shadow.
+            // The ground shows only a shadow on the background: in full light it is the background, and far away there
+            // is no shadow.
             let away = single((own.point - self.world.middle).norm() / (GROUND_REACH * extent));
             let fade = (1.0 - away * away).max(0.0);
             return own
@@ -163,9 +166,9 @@ impl Rendering<'_> {
 
 /// Point of the unit square for a ray of a sample.
 ///
-/// The samples of a square of 8 × 8 are numbered as in a dither matrix and take successive points of one low-discrepancy
-/// sequence (R₂, additive recurrence with the plastic number). Every square of 8 × 8 samples contains each point of the sequence
-/// once, so there is no noise where the light changes slowly.
+/// The samples of a square of 8 × 8 are numbered as in a dither matrix and take successive points of one
+/// low-discrepancy sequence (R₂, additive recurrence with the plastic number). Every square of 8 × 8 samples contains
+/// each point of the sequence once, so there is no noise where the light changes slowly.
 fn spread(index: [i64; 2], ray: u32, rays: u32) -> [f64; 2] {
     const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let [x, y] = index.map(|n| n.rem_euclid(SQUARE as i64));

@@ -1,6 +1,6 @@
-//! One real transform and back: the floor under everything the pyramid does.
+//! Real transforms, on which the speed of the pyramid depends.
 
-#![allow(missing_docs, reason = "criterion's macro makes a public function")]
+#![allow(missing_docs, reason = "criterion's macro generates a public function")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::{Array2, Array3};

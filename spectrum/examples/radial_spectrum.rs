@@ -1,4 +1,4 @@
-//! Radial spectrum of a speckled field, before and after its edges are made to close.
+//! Radial spectrum of a speckled field and of its periodic component.
 //!
 //! `cargo run --example radial_spectrum`
 
@@ -12,7 +12,7 @@ fn main() -> Result<(), SpectrumError> {
     let image = Array2::from_shape_fn((96, 128), |(y, x)| speckle(y, x) as f64 + 2.0 * x as f64);
     let raw = radial_spectrum(image.view(), 12)?;
     let closed = radial_spectrum(periodic_component(image.view())?.view(), 12)?;
-    println!("cycles/pixel   power as is   power of the periodic component");
+    println!("cycles/pixel      power of the field   power of the periodic component");
     for i in 0..12 {
         println!(
             "{:12.3} {:13.1} {:13.1}",

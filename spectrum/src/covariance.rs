@@ -1,4 +1,4 @@
-//! Autocovariance of fields: how alike two samples are, by their distance.
+//! Autocovariance of fields: how similar two samples are as a function of the vector between them.
 
 use ndarray::{Array, Array2, ArrayView, ArrayView2, Dimension, Zip};
 
@@ -36,11 +36,11 @@ pub fn autocovariance<T: Real, D: Dimension>(field: ArrayView<'_, T, D>) -> Resu
     fft.inverse(spectrum)
 }
 
-/// Periodic autocorrelation of a field: its [`autocovariance`] over its variance, so entry 0 is one.
+/// Periodic autocorrelation of a field: its [`autocovariance`] divided by its variance, so entry 0 is one.
 ///
 /// # Errors
 ///
-/// [`SpectrumError::Constant`] for a field without variance; those of [`autocovariance`].
+/// [`SpectrumError::Constant`] for a field without variance; the errors of [`autocovariance`].
 ///
 /// # Examples
 ///
@@ -64,11 +64,11 @@ pub fn autocorrelation<T: Real, D: Dimension>(field: ArrayView<'_, T, D>) -> Res
     Ok(covariance)
 }
 
-/// Autocovariance of an image from the pixels of a mask alone, not wrapped around.
+/// Autocovariance of an image from the pixels of a mask only, without wrapping around.
 ///
 /// Entry `(d_y + reach, d_x + reach)`, `|d| ≤ reach`, is the mean of `(u(x) − mean)(u(x + d) − mean)` over the pairs of
-/// pixels that both lie in the mask, and the number of such pairs is in the second array. The mean is that of the mask's
-/// pixels; values outside the mask are never read. `O(N log N)`.
+/// pixels that both lie in the mask; the second array contains the number of such pairs. The mean is that of the pixels
+/// in the mask; values outside the mask are never read. `O(N log N)`.
 ///
 /// # Errors
 ///
@@ -109,7 +109,7 @@ pub fn masked_autocovariance(
     }
     let mean = inside().sum::<f64>() / selected as f64;
     let (height, width) = image.dim();
-    // Room for every lag without wrapping.
+    // Pad so that no lag wraps around.
     let padded = [height + reach, width + reach];
     let fft = RealFft::<f64>::new(&padded)?;
     let (mut values, mut ones) = (Array2::zeros(padded), Array2::zeros(padded));

@@ -9,17 +9,17 @@
 //! C(d) = (1/N) Σ_x u(x) u(x + d)                      periodic autocovariance of u − mean = inverse transform of P
 //! ```
 //!
-//! Fields are `ndarray` arrays in C order with axes (y, x) or (z, y, x); frequencies are in cycles per sample, so Nyquist
-//! is 1/2. The spectrum of a real field is its half with non-negative frequency along the last axis. A lane is always
-//! transformed by the same steps, so results do not depend on the number of threads. `rustfft` chooses its kernels for
-//! the processor it finds: the last bits may differ between processor types.
+//! Fields are `ndarray` arrays in C order with axes (y, x) or (z, y, x). Frequencies are in cycles per sample, so the
+//! Nyquist frequency is 1/2. The spectrum of a real field is stored as the half with non-negative frequency along the
+//! last axis. Every lane is transformed by the same steps, so results do not depend on the number of threads. `rustfft`
+//! chooses its kernels for the processor at run time: the last bits may differ between processor types.
 //!
-//! Why not `rustfft` alone: it knows lines, not fields. Why not `ndarray` transforms of other crates: real fields cost
-//! half, and the pyramid needs thousands of small transforms without a single allocation ([`RealFft::forward_into`]).
+//! `rustfft` alone transforms lines, not fields. The `ndarray` transforms of other crates cost twice as much for real
+//! fields, and the pyramid needs thousands of small transforms without allocation ([`RealFft::forward_into`]).
 //!
 //! # Examples
 //!
-//! A transform and back, at an odd size:
+//! A forward and an inverse transform, at an odd size:
 //!
 //! ```
 //! use ndarray::Array2;
@@ -33,7 +33,7 @@
 //! # Ok::<(), stereology_spectrum::SpectrumError>(())
 //! ```
 //!
-//! At which frequency is a texture strong?
+//! At which frequency does a texture have the most power?
 //!
 //! ```
 //! use ndarray::Array2;

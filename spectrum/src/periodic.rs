@@ -1,14 +1,14 @@
-//! The periodic component of an image: the image without the cross that its edges put into the spectrum.
+//! The periodic component of an image: the image without the cross that its edges produce in the spectrum.
 
 use ndarray::{Array2, ArrayView2};
 
 use crate::{Complex, Real, RealFft, SpectrumError};
 
-/// Periodic component of an image: the image whose Laplacian equals the image's inside, and which does not jump where
-/// it wraps around. It has the image's mean.
+/// Periodic component of an image: its Laplacian equals that of the image in the interior, and it has no jump where it
+/// wraps around. It has the mean of the image.
 ///
-/// An image repeated as it is jumps at its edges, and the jumps fill the axes of its spectrum with power that the texture
-/// does not have. The image is split into this component and a smooth one that takes the jumps.
+/// A tiled image jumps at its edges, and the jumps add power along the axes of the spectrum that the texture does not
+/// have. The image is the sum of this component and a smooth component that contains the jumps.
 ///
 /// # Formula
 ///

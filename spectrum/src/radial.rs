@@ -1,4 +1,4 @@
-//! Radial power spectra: how strong a field is at each frequency, averaged over directions.
+//! Radial power spectra: the power of a field at each frequency, averaged over directions.
 
 use ndarray::{ArrayView, Dimension};
 
@@ -7,27 +7,27 @@ use crate::{Real, RealFft, SpectrumError, frequency};
 
 /// Power of a field by frequency, averaged over circles (2D) or spheres (3D).
 ///
-/// All bins have the same width; those beyond Nyquist (frequency 1/2) lie in the corners of the square or cube of
-/// frequencies and hold fewer directions.
+/// All bins have the same width. Those beyond the Nyquist frequency 1/2 lie in the corners of the square or cube of
+/// frequencies and contain fewer directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadialSpectrum {
-    /// Mid frequency of each bin, cycles per sample.
+    /// Centre frequency of each bin, cycles per sample.
     pub frequency: Vec<f64>,
-    /// Mean of `|F(k)|² / N` over the bin, in squared units of the field; zero where no frequency falls into the bin.
+    /// Mean of `|F(k)|² / N` over the bin, in squared units of the field; zero for an empty bin.
     pub power: Vec<f64>,
-    /// Frequencies in the bin, both signs counted.
+    /// Number of frequencies in the bin, counting both signs.
     pub count: Vec<u64>,
 }
 
-/// Radial spectrum of a field whose mean is left out, with `bins` bins up to Nyquist and as many of the same width as the
-/// corners need beyond it.
+/// Radial spectrum of a field without its mean, with `bins` bins up to the Nyquist frequency and further bins of the
+/// same width that cover the corners beyond it.
 ///
-/// The field is taken as periodic: take the [`periodic_component`](crate::periodic_component) of a photograph first. The
-/// mean of the field is no bin's; `Σ count · power / N` is the variance of the field.
+/// The field is assumed to be periodic: apply [`periodic_component`](crate::periodic_component) to a photograph first.
+/// The mean of the field is in no bin; `Σ count · power / N` is the variance of the field.
 ///
 /// # Errors
 ///
-/// [`SpectrumError::NoBins`], [`SpectrumError::NotFinite`], [`SpectrumError::Shape`] for more than three axes or none.
+/// [`SpectrumError::NoBins`], [`SpectrumError::NotFinite`], [`SpectrumError::Shape`] for no axis or more than three.
 ///
 /// # Examples
 ///
@@ -75,7 +75,7 @@ pub fn radial_spectrum<T: Real, D: Dimension>(
                 continue;
             }
             let radius = (across + frequency(k, last).powi(2)).sqrt();
-            // A frequency on an edge belongs to the bin above it; the nudge keeps rounding from deciding.
+            // A frequency on an edge belongs to the bin above it, whatever its rounding error.
             let bin = ((radius / width + 1e-9).floor() as usize).min(total - 1);
             let twice = if k == 0 || 2 * k == last { 1 } else { 2 };
             power[bin] += twice as f64 * value.norm_sqr().to_f64_exact() * scale;

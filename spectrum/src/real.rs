@@ -1,4 +1,4 @@
-//! The two kinds of numbers a field may hold.
+//! The number types of fields.
 
 use rustfft::FftNum;
 use rustfft::num_traits::Float;
@@ -16,17 +16,14 @@ use rustfft::num_traits::Float;
 /// assert_eq!(half::<f32>(), 0.5);
 /// ```
 pub trait Real: FftNum + Float {
-    /// The number nearest to `value`.
+    /// The nearest number to `value`.
     fn from_f64_lossy(value: f64) -> Self;
     /// The same number as `f64`.
     fn to_f64_exact(self) -> f64;
 }
 
 impl Real for f32 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "rounding to the nearest f32 is the meaning"
-    )]
+    #[allow(clippy::cast_possible_truncation, reason = "rounding to the nearest f32 is meant")]
     fn from_f64_lossy(value: f64) -> Self {
         value as Self
     }

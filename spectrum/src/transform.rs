@@ -1,4 +1,4 @@
-//! Fourier transforms of fields with one to three axes, each axis of any length.
+//! Fourier transforms of fields with one to three axes of any length.
 
 use std::array;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 
 use crate::{Complex, Real, SpectrumError};
 
-/// Lanes gathered at a time when an axis is not contiguous: two cache lines of complex `f32`.
+/// Number of lanes gathered at once along an axis that is not contiguous: two cache lines of complex `f32`.
 const LANES: usize = 16;
-/// Fields of fewer samples are transformed on the calling thread: handing them out would cost more.
+/// Smaller fields are transformed on the calling thread, because distributing them would cost more.
 const PARALLEL_FROM: usize = 1 << 17;
 
-/// Signed frequency of bin `index` of `n`, in cycles per sample: `index / n`, less one from the middle on.
+/// Signed frequency of bin `index` of `n`, in cycles per sample: `index / n`, minus one in the upper half.
 ///
 /// # Examples
 ///
@@ -36,7 +36,7 @@ pub fn frequency(index: usize, n: usize) -> f64 {
     signed / n as f64
 }
 
-/// Samples of an array that was made, or made again, in C order.
+/// Samples of an array in C order.
 pub(crate) fn contiguous<S: Data, D: Dimension>(array: &ArrayBase<S, D>) -> &[S::Elem] {
     array.as_slice().expect("an array in C order is contiguous")
 }
@@ -62,7 +62,7 @@ fn same(expected: &[usize], found: &[usize]) -> Result<(), SpectrumError> {
     })
 }
 
-/// Buffers of a transform, kept between calls so that a hot loop allocates nothing. Made by [`RealFft::work`].
+/// Buffers of a transform, reused between calls so that a hot loop does not allocate. Created by [`RealFft::work`].
 #[derive(Clone, Debug)]
 pub struct Work<T> {
     row: Vec<T>,
@@ -70,9 +70,10 @@ pub struct Work<T> {
     scratch: Vec<Complex<T>>,
 }
 
-/// Transform of real fields of one shape; the spectrum has the shape of the field with its last length `n` made `n/2 + 1`.
+/// Transform of real fields of one shape. The spectrum has the shape of the field, except that the last length `n`
+/// becomes `n/2 + 1`.
 ///
-/// `O(N log N)` for any size, primes included. Fields of 2^17 samples and more use all threads.
+/// `O(N log N)` for any size, including primes. Fields of 2^17 samples or more use all threads.
 ///
 /// # Examples
 ///
@@ -136,13 +137,13 @@ impl<T: Real> RealFft<T> {
         &self.spectrum_shape
     }
 
-    /// Samples of a field.
+    /// Number of samples of a field.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// Fresh buffers for [`Self::forward_into`] and [`Self::inverse_into`].
+    /// New buffers for [`Self::forward_into`] and [`Self::inverse_into`].
     #[must_use]
     pub fn work(&self) -> Work<T> {
         let zero = Complex::new(T::zero(), T::zero());
@@ -174,8 +175,9 @@ impl<T: Real> RealFft<T> {
         Ok(spectrum)
     }
 
-    /// Real field of a spectrum, divided by the number of samples. The spectrum is taken as Hermitian: imaginary parts
-    /// that no real field has are ignored.
+    /// Inverse transform to a real field, divided by the number of samples.
+    ///
+    /// The spectrum is assumed to be Hermitian: imaginary parts that no real field has are ignored.
     ///
     /// # Errors
     ///
@@ -198,13 +200,12 @@ impl<T: Real> RealFft<T> {
         Ok(field)
     }
 
-    /// Spectrum of a field given and taken as slices in C order. Below 2^17 samples it stays on the calling thread and
-    /// allocates nothing.
+    /// [`Self::forward`] on slices in C order. Below 2^17 samples it runs on the calling thread and does not allocate.
     ///
     /// # Panics
     ///
-    /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work` is
-    /// another transform's.
+    /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work`
+    /// belongs to another transform.
     pub fn forward_into(&self, field: &[T], spectrum: &mut [Complex<T>], work: &mut Work<T>) {
         let (n, half) = self.row_lengths();
         if self.samples() < PARALLEL_FROM {
@@ -222,13 +223,15 @@ impl<T: Real> RealFft<T> {
         }
     }
 
-    /// Field of a spectrum, **not** divided by the number of samples. Below 2^17 samples it stays on the calling thread
-    /// and allocates nothing. The spectrum is used up.
+    /// Inverse transform on slices in C order, **not** divided by the number of samples.
+    ///
+    /// Below 2^17 samples it runs on the calling thread and does not allocate. The contents of `spectrum` are
+    /// overwritten.
     ///
     /// # Panics
     ///
-    /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work` is
-    /// another transform's.
+    /// If the slices do not have the numbers of samples of [`Self::shape`] and [`Self::spectrum_shape`], or `work`
+    /// belongs to another transform.
     pub fn inverse_into(&self, spectrum: &mut [Complex<T>], field: &mut [T], work: &mut Work<T>) {
         let (n, half) = self.row_lengths();
         if self.samples() < PARALLEL_FROM {
@@ -274,7 +277,7 @@ impl<T: Real> RealFft<T> {
             "field and spectrum have as many rows"
         );
         for (row, bins) in field.chunks_exact_mut(n).zip(spectrum.chunks_exact_mut(half)) {
-            // Rounding leaves a trace of imaginary part in the bins that are real by symmetry.
+            // Rounding leaves small imaginary parts in the bins that are real by symmetry.
             bins[0].im = T::zero();
             if n.is_multiple_of(2) {
                 bins[half - 1].im = T::zero();
@@ -286,9 +289,9 @@ impl<T: Real> RealFft<T> {
     }
 }
 
-/// Transform of complex fields of one shape, in place.
+/// In-place transform of complex fields of one shape.
 ///
-/// `O(N log N)` for any size. Fields of 2^17 samples and more use all threads.
+/// `O(N log N)` for any size. Fields of 2^17 samples or more use all threads.
 ///
 /// # Examples
 ///
@@ -332,7 +335,7 @@ impl<T: Real> ComplexFft<T> {
         })
     }
 
-    /// Transforms a field to its spectrum, not scaled.
+    /// Transforms a field to its spectrum, without scaling.
     ///
     /// # Errors
     ///
@@ -368,7 +371,7 @@ impl<T: Real> ComplexFft<T> {
     }
 }
 
-/// Complex transforms along the leading axes of an array whose remaining axes hold `inner` values.
+/// Complex transforms along the leading axes of an array with `inner` values per element of these axes.
 #[derive(Clone)]
 struct Across<T: Real> {
     lengths: Vec<usize>,
@@ -406,7 +409,7 @@ impl<T: Real> Across<T> {
             .unwrap_or(0)
     }
 
-    /// The array as (axes before, this axis, values behind).
+    /// The array as (preceding axes, this axis, following values).
     fn split<'a>(&self, values: &'a mut [Complex<T>], axis: usize, inner: usize) -> ArrayViewMut3<'a, Complex<T>> {
         let outer: usize = self.lengths[..axis].iter().product();
         let behind: usize = self.lengths[axis + 1..].iter().product::<usize>() * inner;
@@ -464,7 +467,7 @@ fn transform_lanes<T: Real>(
     lanes: &mut [Complex<T>],
     scratch: &mut [Complex<T>],
 ) {
-    // Rows are turned to lanes several at a time: that many values fill a cache line of a lane at once.
+    // Copy several rows at once, so that their values fill a cache line of each lane.
     const ROWS: usize = 8;
     let (n, columns) = matrix.dim();
     let lanes = &mut lanes[..n * columns];

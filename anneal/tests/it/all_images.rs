@@ -1,7 +1,8 @@
-//! The search for overlaps against trying every pair in every periodic image, by mathematics that the search does not use.
+//! The search for overlaps, tested against all pairs in all periodic images with independent methods.
 //!
-//! Polytopes: separating axes, all face normals and all cross products of edges. Ellipsoids: the contact function of Perram & Wertheim (1985). Meshes that are not
-//! convex: edges of one through triangles of the other, and parity of a ray for containment.
+//! Polytopes: separating axes, all face normals and all cross products of edges. Ellipsoids: the contact function of
+//! Perram & Wertheim (1985). Meshes that are not convex: edges of one that cross triangles of the other, and the parity
+//! of a ray for containment.
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -15,10 +16,10 @@ use stereology_shape::{
 use crate::brute_force::periods;
 use crate::hollow::bracket;
 
-/// Between touching and this either answer is right; a length, of bodies of size about 1.
+/// For overlaps below this either result is correct; a length, for bodies of size about 1.
 const ROUNDING: f64 = 1e-9;
 
-/// Every pair of particles and images, each once, that `overlap` finds overlapping.
+/// All pairs of particles and images, each once, for which `overlap` is true.
 fn pairs(
     bodies: &[UnitBody],
     particles: &[Particle],
@@ -27,7 +28,7 @@ fn pairs(
 ) -> Vec<(usize, usize)> {
     let reach = |p: &Particle| bodies[p.shape].bounding_radius() * p.size;
     let furthest = particles.iter().map(reach).fold(0.0, f64::max);
-    // Centres may lie anywhere in the box, at both ends of a diagonal.
+    // Centres may lie at opposite corners of the box.
     let most = (1..)
         .find(|n| f64::from(n - 1) * period.sides().min() >= 2.0 * furthest)
         .unwrap();
@@ -53,7 +54,7 @@ fn pairs(
     found
 }
 
-/// What the library finds, but for what may be rounding.
+/// The overlaps that the library finds, without those within rounding.
 fn found(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Vec<(usize, usize)> {
     let mut found: Vec<(usize, usize)> = overlaps(&Arrangement::new(bodies, particles, *period).unwrap())
         .iter()
@@ -64,7 +65,7 @@ fn found(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> V
     found
 }
 
-/// A mesh where it lies in the world.
+/// A mesh in world coordinates.
 struct Placed {
     vertices: Vec<Vector3<f64>>,
     triangles: Vec<[Vector3<f64>; 3]>,
@@ -88,7 +89,7 @@ impl Placed {
             .flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]])
     }
 
-    /// Directions of edges, each once.
+    /// Directions of edges, without duplicates.
     fn directions(&self) -> Vec<Vector3<f64>> {
         let mut directions: Vec<Vector3<f64>> = Vec::new();
         for [from, to] in self.edges() {
@@ -105,7 +106,7 @@ impl Placed {
         heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
     }
 
-    /// Parity of a ray that meets no edge.
+    /// Parity of a ray, which is assumed to cross no edge.
     fn contains(&self, point: &Vector3<f64>) -> bool {
         let direction = Vector3::new(0.577_123, 0.211_7, 0.788_31);
         let crossed = self
@@ -117,7 +118,7 @@ impl Placed {
     }
 }
 
-/// Whether a segment passes a triangle (Möller & Trumbore 1997).
+/// Whether a segment crosses a triangle (Möller & Trumbore 1997).
 fn pierced(triangle: &[Vector3<f64>; 3], from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
     let (u, v, along) = (triangle[1] - triangle[0], triangle[2] - triangle[0], to - from);
     let across = along.cross(&v);
@@ -153,7 +154,8 @@ fn meshes_overlap(a: &Placed, b: &Placed) -> bool {
     cross(a, b) || cross(b, a) || a.contains(&b.vertices[0]) || b.contains(&a.vertices[0])
 }
 
-/// Perram & Wertheim 1985: two ellipsoids overlap exactly if the largest value of a concave function of one number is below 1.
+/// Perram & Wertheim 1985: two ellipsoids overlap exactly if the maximum of a concave function of one variable is below
+/// 1.
 fn ellipsoids_overlap(bodies: &[UnitBody], axes: &[[f64; 3]], a: &Particle, b: &Particle) -> bool {
     let matrix = |p: &Particle| {
         let turn = p.orientation.to_rotation_matrix().into_inner();
@@ -174,7 +176,7 @@ fn ellipsoids_overlap(bodies: &[UnitBody], axes: &[[f64; 3]], a: &Particle, b: &
     value(low) < 1.0 - 2.0 * ROUNDING
 }
 
-/// Particles anywhere in a box, at most as long as it allows.
+/// Particles at random positions of a box, at most of the accepted length.
 fn scattered(
     bodies: &[UnitBody],
     sides: [f64; 3],
@@ -187,7 +189,7 @@ fn scattered(
     let particles = (0..count)
         .map(|_| {
             let shape = rng.random_range(0..bodies.len());
-            // Four times the shortest side is the longest that is accepted.
+            // The accepted length is four times the shortest side.
             let longest = 1.9 * period.sides().min() / bodies[shape].bounding_radius();
             Particle {
                 shape,
@@ -204,7 +206,8 @@ fn scattered(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Rocks, cubes and slabs in boxes of any proportions: fewer than three cells an axis, particles over half the box, their own images.
+    /// Rocks, cubes and slabs in boxes of any proportions: fewer than three cells per axis, particles larger than half
+    /// the box, overlaps with their own images.
     #[test]
     fn polytopes_in_narrow_boxes(
         sides in prop::array::uniform3(0.8..3.5_f64), count in 1_usize..7, largest in 0.4..2.4_f64, seed in 0_u64..100_000,
@@ -215,7 +218,7 @@ proptest! {
         prop_assert_eq!(found(&bodies, &particles, &period), pairs(&bodies, &particles, &period, &overlap));
     }
 
-    /// Cubes on a lattice that the box continues: faces, edges and corners meet exactly, across the walls too.
+    /// Cubes on a lattice that fits the box: faces, edges and corners meet exactly, also across the walls.
     #[test]
     fn lattice_cubes_in_narrow_boxes(sides in prop::array::uniform3(1..6_i32), count in 1_usize..7, seed in 0_u64..100_000) {
         let cube = [UnitBody::new(&Body::cuboid([1.0; 3]).unwrap())];
@@ -233,7 +236,7 @@ proptest! {
         prop_assert_eq!(found(&cube, &particles, &period), pairs(&cube, &particles, &period, &overlap));
     }
 
-    /// Ellipsoids, needles and lenses.
+    /// Ellipsoids, including needles and lenses.
     #[test]
     fn ellipsoids_in_narrow_boxes(
         sides in prop::array::uniform3(0.8..3.5_f64), count in 1_usize..8, largest in 0.4..2.0_f64, seed in 0_u64..100_000,
@@ -245,7 +248,7 @@ proptest! {
         prop_assert_eq!(found(&bodies, &particles, &period), pairs(&bodies, &particles, &period, &overlap));
     }
 
-    /// Rings and brackets, which reach around each other and into the next period.
+    /// Rings and brackets, which interlock and extend into the next period.
     #[test]
     fn hollow_bodies_in_narrow_boxes(
         sides in prop::array::uniform3(0.8..3.5_f64), count in 1_usize..6, largest in 0.4..1.8_f64, seed in 0_u64..100_000,
@@ -258,9 +261,10 @@ proptest! {
     }
 }
 
-/// Aligned cubes are where searches that follow vertices go astray (GJK and EPA of parry 0.31: 10 wrong depths of 20,000): none here.
+/// Searches that follow vertices fail for some aligned cubes (GJK and EPA of parry 0.31: 10 wrong depths of 20,000);
+/// this one for none.
 #[test]
-fn of_twenty_thousand_aligned_cubes_none_is_wrong() {
+fn depths_of_aligned_cubes_are_correct() {
     let cube = [UnitBody::new(&Body::cuboid([1.0; 3]).unwrap())];
     let unit = cube[0].body().size();
     let period = PeriodicBox::new(Vector3::repeat(20.0)).unwrap();
@@ -275,7 +279,7 @@ fn of_twenty_thousand_aligned_cubes_none_is_wrong() {
             position: Point3::from(Vector3::repeat(8.0) + offset * k as f64),
             orientation: UnitQuaternion::identity(),
         });
-        // Boxes part along the axis in which their centres are furthest apart.
+        // Boxes separate along the axis in which their centres are farthest apart.
         let gap = offset.abs().max() - 0.5 * (edges[0] + edges[1]);
         let found = overlaps(&Arrangement::new(&cube[..], &pair[..], period).unwrap());
         let depth = found.first().map_or(0.0, |overlap| overlap.depth);

@@ -1,9 +1,9 @@
-//! Slow answers to judge fast ones by.
+//! Brute-force methods, against which the fast ones are tested.
 
 use nalgebra::{Matrix3, Vector3};
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
 
-/// All pairs of spheres and their images within three periods, by trying them all; depths.
+/// Depths of all overlaps of spheres and their images within three periods, by trying all pairs.
 pub(crate) fn sphere_overlaps(particles: &[Particle], period: &PeriodicBox) -> Vec<(usize, usize, f64)> {
     let mut found = Vec::new();
     for (i, p) in particles.iter().enumerate() {
@@ -24,7 +24,7 @@ pub(crate) fn sphere_overlaps(particles: &[Particle], period: &PeriodicBox) -> V
     found
 }
 
-/// All periods up to so many away along each axis.
+/// All images up to `most` periods away along each axis.
 pub(crate) fn periods(most: i32) -> impl Iterator<Item = [i32; 3]> {
     let range = -most..=most;
     range.clone().flat_map(move |x| {
@@ -33,7 +33,7 @@ pub(crate) fn periods(most: i32) -> impl Iterator<Item = [i32; 3]> {
     })
 }
 
-/// Whether two boxes of given full edges overlap by more than rounding: the fifteen axes of Gottschalk.
+/// Whether two boxes with given full edges overlap by more than rounding: the fifteen axes of Gottschalk.
 pub(crate) fn boxes_overlap(edges: [Vector3<f64>; 2], turns: [Matrix3<f64>; 2], offset: &Vector3<f64>) -> bool {
     let mut axes: Vec<Vector3<f64>> = turns
         .iter()
@@ -54,7 +54,7 @@ pub(crate) fn boxes_overlap(edges: [Vector3<f64>; 2], turns: [Matrix3<f64>; 2], 
     })
 }
 
-/// Full edges, in unit-body coordinates, of a box made by `Body::cuboid`.
+/// Full edges, in unit-body coordinates, of a box created by `Body::cuboid`.
 pub(crate) fn unit_edges(body: &UnitBody, edges: [f64; 3]) -> Vector3<f64> {
     Vector3::from(edges) / body.body().size()
 }

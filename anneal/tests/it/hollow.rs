@@ -1,4 +1,4 @@
-//! Bodies that are not convex: packed by parts or proxies, certified as they are.
+//! Bodies that are not convex are packed as parts or proxies, and certified as meshes.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use stereology_shape::{
     Arrangement, Body, ClosedMesh, Particle, PeriodicBox, TriangleMesh, UnitBody, isotropic_rotation,
 };
 
-/// An L of three unit cubes in one plane: a prism over its outline.
+/// An L of three unit cubes: a prism over its outline.
 pub(crate) fn bracket() -> UnitBody {
     let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
     let vertices = [0.0, 1.0]
@@ -38,7 +38,7 @@ fn ring() -> UnitBody {
     UnitBody::new(&Body::from_mesh(mesh))
 }
 
-/// Three crossed bars of 5 x 1 x 1: the faces of thirteen cubes that no two share.
+/// Three crossed bars of 5 x 1 x 1: the outer faces of thirteen cubes.
 fn jack() -> UnitBody {
     let mut mesh = TriangleMesh {
         vertices: Vec::new(),
@@ -91,7 +91,7 @@ fn a_bracket_is_two_boxes_and_a_box_is_one() {
     let parts = ConvexParts::of(&bracket(), 0.01);
     assert_eq!(parts.hulls().len(), 2);
     assert!(parts.excess() < 1e-9);
-    // Three crossed bars: seven boxes or fewer, the middle one, which has no surface of its own, among them.
+    // Three crossed bars are at most seven boxes, including the central one, which has no outer surface.
     let parts = ConvexParts::of(&jack(), 0.01);
     let volume: f64 = parts.hulls().iter().map(ClosedMesh::volume).sum();
     assert!((volume / jack().volume() - 1.0).abs() < 1e-9 && parts.excess() < 1e-9);
@@ -106,7 +106,7 @@ fn a_bracket_is_two_boxes_and_a_box_is_one() {
 }
 
 #[test]
-fn hollow_bodies_are_packed_by_parts_and_by_proxies() {
+fn concave_bodies_are_packed_as_parts_and_as_proxies() {
     let bodies = [bracket(), ring(), UnitBody::new(&Body::sphere(1.0).unwrap())];
     let grains = mix(&lognormal_sizes(90, 0.3, 1).unwrap(), &[1.0; 3], 1).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.2).unwrap();
@@ -123,9 +123,10 @@ fn hollow_bodies_are_packed_by_parts_and_by_proxies() {
     }
 }
 
-/// Two chained rings do not overlap, though each one's hull holds a piece of the other; parted by a ring's thickness they do.
+/// Two linked rings do not overlap, although the hull of each contains a piece of the other; shifted into each other
+/// they do.
 #[test]
-fn chained_rings_are_apart() {
+fn linked_rings_are_separate() {
     let ring = ring();
     let size = ring.body().size();
     let period = PeriodicBox::new(Vector3::repeat(10.0)).unwrap();
@@ -140,7 +141,7 @@ fn chained_rings_are_apart() {
 }
 
 #[test]
-fn a_ball_in_a_ring_is_apart_and_one_inside_its_tube_is_not() {
+fn a_body_in_the_hole_of_a_ring_is_separate_and_one_inside_its_tube_is_not() {
     let bodies = [
         ring(),
         UnitBody::new(&Body::sphere(1.0).unwrap()),
@@ -158,14 +159,14 @@ fn a_ball_in_a_ring_is_apart_and_one_inside_its_tube_is_not() {
         assert!(pair(0.9, 0.0).is_empty(), "{shape} in the hole");
         assert_eq!(pair(0.05, 1.0).len(), 1, "{shape} wholly inside the tube");
         assert_eq!(pair(0.9, 0.4).len(), 1, "{shape} across the surface");
-        // The ring wholly inside a larger one, which no face of either crosses.
+        // The ring lies inside a larger body, and no faces cross.
         if shape < 3 {
             assert_eq!(pair(9.0, 0.1).len(), 1, "{shape} around the ring");
         }
     }
 }
 
-/// Two L interlock to a plate of two by three, and plates fill space.
+/// Two L-shaped bodies interlock to a plate of two by three, and plates fill space.
 #[test]
 fn brackets_fill_space() {
     let bracket = bracket();
@@ -181,7 +182,7 @@ fn brackets_fill_space() {
     let fitting = vec![upright, inverted(Vector3::new(2.0, 3.0, 0.0))];
     let packing = Packing::verify(&Arrangement::new([bracket.clone()], fitting, period).unwrap()).unwrap();
     assert!((packing.fraction() - 1.0).abs() < 1e-9);
-    // All of the same planes, but on one another.
+    // The same planes, but with overlap.
     for corner in [[2.0, 2.0, 0.0], [1.0, 2.0, 0.0], [1.5, 3.0, 0.0]] {
         let period = PeriodicBox::new(Vector3::new(6.0, 6.0, 6.0)).unwrap();
         let pair = vec![upright, inverted(Vector3::from(corner))];
@@ -198,7 +199,7 @@ fn brackets_fill_space() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Two bodies overlap if points of one are in the other: many random points find any overlap that is not small.
+    /// Two bodies overlap if they share points: many random points detect every overlap that is not small.
     #[test]
     fn the_certificate_agrees_with_random_points(seed in 0_u64..100_000) {
         let bodies = [bracket(), ring(), UnitBody::new(&Body::rock(3)), UnitBody::new(&Body::ellipsoid([1.0, 0.6, 0.4]).unwrap())];
@@ -219,15 +220,15 @@ proptest! {
         if shared > 0 {
             prop_assert_eq!(found.len(), 1);
         } else if let Some(overlap) = found.first() {
-            // What so many points miss is shallow.
+            // An overlap without sampled points is shallow.
             prop_assert!(overlap.depth < 0.15, "{:?}", overlap);
         }
     }
 }
 
-/// Rings dropped on one another link; those too thick to be linked are taken elsewhere, not left as a failure.
+/// Rings at random positions are often linked; those too thick to be linked are moved elsewhere instead of failing.
 #[test]
-fn linked_rings_too_thick_for_each_other_are_freed() {
+fn rings_too_thick_to_be_linked_are_separated() {
     let thick = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 16, 8)).unwrap();
     let bodies = [UnitBody::new(&Body::from_mesh(thick))];
     let grains = mix(&lognormal_sizes(120, 0.4, 2).unwrap(), &[1.0], 2).unwrap();

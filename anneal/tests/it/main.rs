@@ -1,6 +1,6 @@
-//! Laws of packings, judged by closed forms and brute force.
+//! Laws of packings, tested against closed forms and brute force.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails says where")]
+#![expect(clippy::unwrap_used, reason = "a failing test reports where")]
 
 mod all_images;
 mod brute_force;

@@ -1,4 +1,4 @@
-//! What the ways of packing have in common, and what each is good for.
+//! Laws that all modes of packing obey.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -42,7 +42,7 @@ fn mixture() -> Vec<UnitBody> {
     .collect()
 }
 
-/// One API, one result: every mode certifies the same fraction.
+/// Every mode certifies the same fraction.
 #[test]
 fn every_mode_packs() {
     for mode in MODES {
@@ -53,7 +53,7 @@ fn every_mode_packs() {
 }
 
 #[test]
-fn annealing_packs_densely_and_tells_its_energies() {
+fn annealing_packs_densely_and_reports_its_energies() {
     let spheres = [UnitBody::new(&Body::sphere(1.0).unwrap())];
     let packing = packed(&spheres, 300, 0.6, &PackOptions::default().with_mode(Mode::anneal())).unwrap();
     let energies = packing.energies();
@@ -88,7 +88,8 @@ fn threads_change_no_bit_in_any_mode() {
     }
 }
 
-/// So many particles that threads share them, of every kind: spheres, rocks with ellipsoids, and bodies moved by parts.
+/// The number of particles is large enough for several threads: spheres, rocks with ellipsoids, and bodies moved as
+/// convex parts.
 #[test]
 fn threads_change_no_bit_of_any_shape() {
     let kinds: [(Vec<UnitBody>, usize, f64); 3] = [
@@ -116,7 +117,8 @@ fn threads_change_no_bit_of_any_shape() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Few large particles in boxes of any proportions: less than three cells an axis, particles over half the box, their own images in the way.
+    /// Few large particles in boxes of any proportions: fewer than three cells per axis, particles larger than half the
+    /// box, overlaps with their own images.
     #[test]
     fn narrow_boxes_are_packed(sides in prop::array::uniform3(1.1..4.0_f64), count in 1_usize..6, mode in 0_usize..4, seed in 0_u64..1000) {
         let rods = [UnitBody::new(&Body::cuboid([0.3, 0.3, 1.2]).unwrap()), UnitBody::new(&Body::sphere(1.0).unwrap())];

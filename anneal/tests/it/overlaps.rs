@@ -1,4 +1,4 @@
-//! The certificate finds every overlap and invents none.
+//! The certificate finds all overlaps and no others.
 
 use crate::brute_force::{boxes_overlap, sphere_overlaps, unit_edges};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -26,7 +26,7 @@ fn scattered(count: usize, largest: f64, sides: [f64; 3], seed: u64) -> (Vec<Par
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut particle = || Particle {
         shape: 0,
-        // Sizes over more than a decade.
+        // Sizes spread over more than a decade.
         size: largest * (-2.5 * rng.random::<f64>()).exp(),
         category: 0,
         position: Point3::from(sides.map(|side| side * rng.random::<f64>())),
@@ -41,9 +41,9 @@ fn scattered(count: usize, largest: f64, sides: [f64; 3], seed: u64) -> (Vec<Par
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Two spheres overlap by the sum of their radii less their distance, wherever the box puts them.
+    /// Two spheres overlap by the sum of their radii minus their distance, at any position.
     #[test]
-    fn two_spheres_overlap_by_radii_less_distance(
+    fn two_spheres_overlap_by_radii_minus_distance(
         sizes in (0.1..2.0_f64, 0.1..2.0_f64),
         gap in -0.9..0.9_f64,
         direction in (0.0..1.0_f64, 0.0..1.0_f64),
@@ -52,9 +52,9 @@ proptest! {
         let touching = 0.5 * (sizes.0 + sizes.1);
         let distance = touching * (1.0 + gap);
         let (z, angle) = (2.0 * direction.0 - 1.0, direction.1 * std::f64::consts::TAU);
-        let way = Vector3::new((1.0 - z * z).sqrt() * angle.cos(), (1.0 - z * z).sqrt() * angle.sin(), z) * distance;
+        let offset = Vector3::new((1.0 - z * z).sqrt() * angle.cos(), (1.0 - z * z).sqrt() * angle.sin(), z) * distance;
         let first = Point3::from(place);
-        let second = first + way;
+        let second = first + offset;
         let particles = [at(sizes.0, place), at(sizes.1, [second.x, second.y, second.z])];
         let found = overlaps(&Arrangement::new([sphere()], &particles[..], PeriodicBox::new(Vector3::repeat(10.0)).unwrap()).unwrap());
         if gap < -1e-9 {
@@ -65,7 +65,7 @@ proptest! {
         }
     }
 
-    /// All pairs of all images, in boxes of any shape with spheres up to larger than the box.
+    /// All pairs of all images, in boxes of any proportions with spheres up to larger than the box.
     #[test]
     fn spheres_agree_with_trying_all_pairs(
         count in 1_usize..60, largest in 0.2..2.5_f64, sides in prop::array::uniform3(1.0..6.0_f64), seed in 0_u64..1000,
@@ -79,7 +79,7 @@ proptest! {
         }
     }
 
-    /// Where the box begins is nobody's business.
+    /// Overlaps do not depend on the origin of the box.
     #[test]
     fn a_translation_leaves_the_overlaps(shift in prop::array::uniform3(-10.0..10.0_f64), seed in 0_u64..1000) {
         let (mut particles, period) = scattered(40, 1.5, [3.0, 4.0, 5.0], seed);
@@ -96,7 +96,7 @@ proptest! {
         prop_assert_eq!(before, pairs(&particles));
     }
 
-    /// Boxes of any proportions in any orientation: the fifteen separating axes decide.
+    /// Boxes of any proportions in any orientation agree with the fifteen separating axes.
     #[test]
     fn boxes_agree_with_separating_axes(edges in prop::array::uniform3(0.2..2.0_f64), seed in 0_u64..10_000) {
         let body = UnitBody::new(&Body::cuboid(edges).unwrap());
@@ -112,7 +112,8 @@ proptest! {
         }
     }
 
-    /// Cubes of a lattice: aligned faces, edges and corners, just touching, just apart, just overlapping, or far into one another.
+    /// Cubes on a lattice: aligned faces, edges and corners that touch, are barely separate, overlap barely or overlap
+    /// deeply.
     #[test]
     fn lattice_cubes_agree_with_separating_axes(seed in 0_u64..10_000) {
         let body = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
@@ -143,7 +144,7 @@ fn agrees(body: &UnitBody, edges: [f64; 3], particles: &[Particle; 2]) -> Result
         )
         .unwrap(),
     );
-    // Between touching and 1e-9 either answer is right.
+    // For depths below 1e-9 either result is correct.
     let really = found.iter().any(|o| o.depth > 2e-9);
     prop_assert_eq!(really, expected, "{:?} {:?}", found, particles);
     prop_assert!(expected || found.iter().all(|o| o.depth < 2e-9));
@@ -177,8 +178,8 @@ fn cubes_fill_space() {
 }
 
 #[test]
-fn a_rod_longer_than_the_box_meets_only_itself() {
-    // 3 x 0.4 x 0.4 in a box of side 2: along an axis it runs into itself; turned a little, it passes beside itself.
+fn a_rod_longer_than_the_box_overlaps_only_itself() {
+    // 3 x 0.4 x 0.4 in a box of side 2: along an axis it overlaps its own image; slightly rotated, it passes beside it.
     let rod = UnitBody::new(&Body::cuboid([3.0, 0.4, 0.4]).unwrap());
     let size = rod.body().size();
     let period = PeriodicBox::new(Vector3::repeat(2.0)).unwrap();
@@ -186,7 +187,7 @@ fn a_rod_longer_than_the_box_meets_only_itself() {
     let found = overlaps(&Arrangement::new([rod.clone()], [along], period).unwrap());
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].first, found[0].second), (0, 0));
-    // One unit along itself, but its own width aside.
+    // The overlap is one unit along the rod, but only its width sideways.
     assert!((found[0].depth - 0.4).abs() < 1e-9);
     let turned = Particle {
         orientation: UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5),

@@ -1,4 +1,4 @@
-//! What `pack` promises.
+//! Guarantees of `pack`.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -46,7 +46,7 @@ fn zoo() -> Vec<UnitBody> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Any mixture, any spread of sizes: certified, in the box, and exactly as dense as asked for.
+    /// Any mixture with any spread of sizes is certified, in the box, and exactly as dense as requested.
     #[test]
     fn mixtures_pack_exactly(count in 1_usize..150, sigma in 0.0..0.6_f64, fraction in 0.02..0.4_f64, seed in 0_u64..100) {
         let packing = match packed(&zoo(), count, sigma, fraction, seed, &PackOptions::default()) {
@@ -79,9 +79,9 @@ fn wide_sizes_are_packed() {
     packed(&spheres, 1000, 0.8, 0.55, 2, &PackOptions::default()).unwrap();
 }
 
-/// Grains of dust must come out from under boulders a thousand times their size without a step for every grain's width.
+/// Small particles inside particles a thousand times their size escape without needing one step per own width.
 #[test]
-fn dust_gets_out_from_under_boulders() {
+fn small_particles_escape_from_large_ones() {
     let spheres = [UnitBody::new(&Body::sphere(1.0).unwrap())];
     let mut sizes = vec![1.0; 20];
     sizes.extend((1..400).map(|k| 0.2 / f64::from(k)));
@@ -99,7 +99,7 @@ fn dust_gets_out_from_under_boulders() {
 
 #[test]
 fn faces_pack_flat() {
-    // Face against face the energy has creases; this is where dynamics that stop at every uphill step stall.
+    // For faces in contact the energy has creases, on which dynamics that stop at every uphill step stall.
     let cubes = [UnitBody::new(&Body::cuboid([1.0; 3]).unwrap())];
     packed(&cubes, 200, 0.0, 0.55, 1, &PackOptions::default()).unwrap();
 }
@@ -111,7 +111,7 @@ fn rods_are_packed() {
 }
 
 #[test]
-fn the_way_of_the_paper_packs_too_and_turns_nobody() {
+fn the_method_of_the_paper_packs_without_rotation() {
     let bodies = zoo();
     let grains = mix(&lognormal_sizes(200, 0.3, 3).unwrap(), &[1.0; 5], 3).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.25).unwrap();
@@ -158,7 +158,7 @@ fn threads_change_no_bit() {
 }
 
 #[test]
-fn a_packing_stays_as_it_is() {
+fn packing_a_packing_changes_nothing() {
     let packing = packed(&zoo(), 50, 0.2, 0.3, 4, &PackOptions::default()).unwrap();
     let again = pack(
         &packing,
@@ -172,7 +172,7 @@ fn a_packing_stays_as_it_is() {
 }
 
 #[test]
-fn identical_particles_in_one_place_part() {
+fn identical_particles_at_one_position_separate() {
     let bodies = zoo();
     let period = stereology_shape::PeriodicBox::new(Vector3::repeat(6.0)).unwrap();
     let same = |shape| Particle {

@@ -1,4 +1,4 @@
-//! Particles drawn as they were asked for.
+//! Populations have the requested sizes, shapes and fractions.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -11,7 +11,7 @@ use stereology_shape::{Body, PeriodicBox, UnitBody};
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// However the box or the sizes follow, the fraction is the one asked for.
+    /// The volume fraction is the requested one, whether the box or the sizes are adjusted.
     #[test]
     fn fractions_are_exact(count in 1_usize..500, sigma in 0.0..1.0_f64, fraction in 0.01..0.7_f64, seed in 0_u64..100) {
         let bodies = [UnitBody::new(&Body::sphere(3.0).unwrap()), UnitBody::new(&Body::cuboid([1.0, 2.0, 3.0]).unwrap())];
@@ -24,7 +24,7 @@ proptest! {
         prop_assert!((total_volume(&bodies, &grains).unwrap() / 6.0 - fraction).abs() < 1e-12);
     }
 
-    /// Rounding from the largest bin down: nowhere is the number above a size off by more than a half.
+    /// Rounding from the largest bin down: the number above any size differs from its expectation by at most a half.
     #[test]
     fn cumulative_counts_are_rounded(densities in prop::collection::vec(0.0..3.0_f64, 1..30), volume in 0.1..50.0_f64) {
         let counts = counts_from_densities(&densities, volume).unwrap();
@@ -35,7 +35,7 @@ proptest! {
         }
     }
 
-    /// Sizes lie in the bins they were asked for, types and categories stay.
+    /// Sizes lie in their bins; shapes and categories are kept.
     #[test]
     fn grains_lie_in_their_bins(densities in prop::collection::vec(0.0..3.0_f64, 1..10), seed in 0_u64..100) {
         let edges: Vec<f64> = (0..=densities.len()).map(|i| i as f64).collect();
@@ -57,7 +57,7 @@ proptest! {
         }
     }
 
-    /// Shares by number are as exact as whole particles allow.
+    /// Number fractions of shapes are as exact as whole particles allow.
     #[test]
     fn shares_are_exact(count in 0_usize..300, shares in prop::collection::vec(0.0..1.0_f64, 1..5), seed in 0_u64..100) {
         let whole: f64 = shares.iter().sum();
@@ -70,9 +70,9 @@ proptest! {
     }
 }
 
-/// Places fill the box evenly: χ² of 8 octants over 80,000 grains; false alarm 10⁻⁶ (χ²₇ > 40.5).
+/// Positions are uniform: χ² of 8 octants over 80,000 grains; false-alarm rate 10⁻⁶ (χ²₇ > 40.5).
 #[test]
-fn places_are_uniform() {
+fn positions_are_uniform() {
     let period = PeriodicBox::new(Vector3::new(1.0, 2.0, 3.0)).unwrap();
     let particles = populate(
         &[Grain {

@@ -1,4 +1,4 @@
-//! Packings judged by theory.
+//! Statistics of packings, tested against theory.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -24,10 +24,10 @@ fn sphere() -> [UnitBody; 1] {
     [UnitBody::new(&Body::sphere(1.0).unwrap())]
 }
 
-/// Equal spheres that have forgotten how they were packed touch as often as Carnahan and Starling say: 2.48 at .3, 4.66 at .45.
+/// Equal spheres in equilibrium have the contact values of Carnahan and Starling: 2.48 at .3, 4.66 at .45.
 ///
-/// Ten snapshots of 800 spheres hold some 10⁵ pairs below 1.25: the fitted contact value varies by about 1 % (measured over seeds), and the equation itself is
-/// good to 1 %; 8 % stands for a false alarm below 10⁻⁶.
+/// Ten snapshots of 800 spheres contain about 10⁵ pairs below 1.25: the fitted contact value varies by about 1 %
+/// (measured over seeds), and the equation is accurate to 1 %; a tolerance of 8 % gives a false-alarm rate below 10⁻⁶.
 #[test]
 fn equilibrium_obeys_carnahan_and_starling() {
     for (fraction, seed) in [(0.3, 1), (0.45, 2)] {
@@ -51,7 +51,7 @@ fn equilibrium_obeys_carnahan_and_starling() {
     }
 }
 
-/// A simple cubic lattice has 6 neighbours at 1, 12 at √2, 8 at √3.
+/// In a simple cubic lattice a particle has 6 neighbours at 1, 12 at √2, 8 at √3.
 #[test]
 fn a_lattice_has_its_shells() {
     let at = |k: i32| Particle {
@@ -66,23 +66,23 @@ fn a_lattice_has_its_shells() {
     let radial = radial_distribution(&particles, &period, Distance::Centres, 1.9, 19);
     let shells: Vec<u64> = radial.pairs.iter().copied().filter(|&n| n > 0).collect();
     assert_eq!(shells, [64 * 3, 64 * 6, 64 * 4]);
-    // Cubic: Q6 is .3536.
+    // Q6 of the cubic lattice is .3536.
     assert!((bond_order(&particles, &period, 1.2).global - 0.125_f64.sqrt()).abs() < 1e-3);
 }
 
-/// Packed spheres are no crystal: all bonds together have no order of the sixth degree.
+/// Packed spheres are not crystalline: their bonds have no order of degree 6.
 #[test]
 fn packings_are_disordered_and_isotropic() {
     let packing = packed(&sphere(), 1000, 0.3, 0.6, 3);
     let order = bond_order(packing.particles(), packing.period(), 1.2);
     assert!(order.bonds > 2000);
-    // Of independent bonds one packing in a million exceeds 2.05 / √bonds (χ² of 13 degrees of freedom above 54.6); those about a particle keep apart, so theirs varies
-    // more, and the bound is wider.
+    // For independent bonds one packing in a million exceeds 2.05 / √bonds (χ² of 13 degrees of freedom above 54.6).
+    // Bonds of one particle exclude each other, so Q6 varies more, and the bound is wider.
     assert!(order.global < 3.0 / (order.bonds as f64).sqrt(), "{order:?}");
     let rods = [UnitBody::new(&Body::cuboid([1.0, 1.0, 4.0]).unwrap())];
     let packing = packed(&rods, 300, 0.2, 0.25, 3);
     let tensor = orientation_tensor(packing.particles(), &Vector3::z()).unwrap();
-    // One in a million: χ² of 5 degrees of freedom.
+    // χ² of 5 degrees of freedom exceeds this once in a million.
     assert!(tensor.bingham < 35.9, "{tensor:?}");
     let aligned: Vec<Particle> = packing
         .particles()
@@ -96,13 +96,14 @@ fn packings_are_disordered_and_isotropic() {
     assert!(tensor.bingham > 1000.0 && (tensor.eigenvalues[2] - 1.0).abs() < 1e-12);
 }
 
-/// N_A = H N_V on planes through a packing, of spheres and of rocks; particles of half the size show themselves.
+/// N_A = H N_V on planes through a packing of spheres and of rocks.
 #[test]
-fn sections_show_what_was_packed() {
+fn sections_represent_the_packing() {
     for bodies in [sphere(), [UnitBody::new(&Body::rock(2))]] {
         let packing = packed(&bodies, 400, 0.3, 0.45, 4);
         let test = section_test(&packing, 8, 99, 0);
-        // Packed particles keep apart: counts vary less than random ones, of which two in a hundred would be told off here.
+        // Packed particles exclude each other, so their counts vary less than those of random arrangements, of which 2
+        // % would fail here.
         assert!(test.p_value > 0.02, "{test:?}");
         let widths: f64 = packing
             .particles()
@@ -121,10 +122,11 @@ fn sections_show_what_was_packed() {
     }
 }
 
-/// Particles without any order are what every statistic is held against: each must give what probability says it gives.
+/// Every statistic has its theoretical distribution for independent particles.
 ///
-/// A hundred arrangements of 500: means of Bingham's statistic (χ² of 5 degrees) and of bonds × Q6² × 13 (χ² of 13, nearly: bonds that share a particle are independent) lie within 4.9
-/// of their standard deviations; each of twenty bins of g(r) within 5.4 of Poisson's (of twenty bins one false alarm in 10⁶ or fewer).
+/// A hundred arrangements of 500: means of Bingham's statistic (χ² of 5 degrees) and of bonds × Q6² × 13 (nearly χ² of
+/// 13, because bonds that share a particle are independent) lie within 4.9 of their standard deviations; each of twenty
+/// bins of g(r) within 5.4 of those of Poisson counts (a false-alarm rate of at most 10⁻⁶ over twenty bins).
 #[test]
 fn statistics_of_independent_particles_are_calibrated() {
     let period = PeriodicBox::new(Vector3::new(9.0, 8.0, 7.0)).unwrap();
@@ -144,15 +146,16 @@ fn statistics_of_independent_particles_are_calibrated() {
     assert!((bingham - 5.0).abs() < 4.9 * (10.0_f64 / 100.0).sqrt(), "{bingham}");
     assert!((order - 1.0).abs() < 4.9 * (2.0_f64 / 13.0 / 100.0).sqrt(), "{order}");
     for (bin, (pairs, expected)) in pairs.iter().zip(expected).enumerate().skip(1) {
-        let apart = (*pairs as f64 - expected) / expected.sqrt();
-        assert!(apart.abs() < 5.4, "{bin}: {pairs} {expected}");
+        let deviation = (*pairs as f64 - expected) / expected.sqrt();
+        assert!(deviation.abs() < 5.4, "{bin}: {pairs} {expected}");
     }
 }
 
-/// Of particles so few that they are where they are, one in ten has a p of .1 or less: of 200, fewer than 3 or more than 44 once in a million.
-/// Planes that fit the layers of a lattice cut every ball at one height, and are found out.
+/// For dilute particles, which are independent, p is .1 or less in one of ten packings: of 200, fewer than 3 or more
+/// than 44 once in a million. Planes with the spacing of a lattice cut every sphere at the same height, and the test
+/// detects it.
 #[test]
-fn the_section_test_is_calibrated_and_sees_layers() {
+fn the_section_test_is_calibrated_and_detects_layers() {
     let bodies = sphere();
     let grains = mix(&lognormal_sizes(120, 0.3, 1).unwrap(), &[1.0], 1).unwrap();
     let period = box_for_fraction(&bodies, &grains, 0.002).unwrap();
@@ -189,7 +192,7 @@ fn the_section_test_is_calibrated_and_sees_layers() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Planes through equal spheres show N_A = D N_V, wherever they are.
+    /// On planes through equal spheres N_A = D N_V, whatever their positions.
     #[test]
     fn sections_of_spheres_obey_the_fundamental_relation(diameter in 0.1..10.0_f64, fraction in 0.1..0.55_f64, seed in 0_u64..1000) {
         let bodies = sphere();
@@ -199,11 +202,12 @@ proptest! {
         let test = section_test(&packing, 10, 2, seed);
         let expected = diameter * 300.0 / period.volume();
         let profiles: f64 = test.profiles.iter().sum();
-        // Planes lie nearer to each other than a diameter, so counts vary far less than Poisson's: 4.9 of its standard deviations hold to 10⁻⁶.
+        // The spacing of planes is less than a diameter, so counts vary far less than Poisson counts: 4.9 standard
+        // deviations give a false-alarm rate below 10⁻⁶.
         prop_assert!((test.profiles_per_area / expected - 1.0).abs() < 4.9 / profiles.sqrt());
     }
 
-    /// Where the box begins changes no statistic.
+    /// Statistics do not depend on the origin of the box.
     #[test]
     fn a_translation_leaves_the_statistics(shift in prop::array::uniform3(-9.0..9.0_f64), seed in 0_u64..100) {
         let period = PeriodicBox::new(Vector3::new(3.0, 5.0, 4.0)).unwrap();

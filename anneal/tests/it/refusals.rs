@@ -1,4 +1,4 @@
-//! What cannot be packed is said to be so, before or after trying.
+//! Impossible packings are refused, before or after an attempt.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
@@ -38,16 +38,17 @@ fn more_than_the_densest_is_refused_at_once() {
     ));
 }
 
-/// Whatever holds a ball cannot be packed more densely than the balls: .7405 over their share of the volume.
+/// Bodies that contain a sphere cannot be packed more densely than the spheres: .7405 divided by their fraction of the
+/// volume.
 #[test]
-fn what_is_nearly_round_is_refused_nearly_as_soon() {
+fn nearly_round_bodies_are_refused_at_nearly_the_same_fraction() {
     let round = ClosedMesh::try_from(TriangleMesh::icosphere(1.0, 3)).unwrap();
     let round = UnitBody::new(&Body::from_mesh(round));
     let Err(PackError::TooDense { limit, .. }) = try_pack(&[round], 50, 0.78, &PackOptions::default()) else {
         panic!("packed at .78")
     };
     assert!((0.7405..0.77).contains(&limit), "{limit}");
-    // Two kinds, of which one is round: between the two.
+    // The limit of a mixture of spheres and cubes lies between their limits.
     let cube = UnitBody::new(&Body::cuboid([1.0; 3]).unwrap());
     let limit = |bodies: &[UnitBody]| {
         let grains = mix(&[1.0; 40], &vec![1.0; bodies.len()], 0).unwrap();
@@ -62,7 +63,7 @@ fn what_is_nearly_round_is_refused_nearly_as_soon() {
 }
 
 #[test]
-fn jamming_is_reported_with_what_remains() {
+fn jamming_is_reported_with_the_remaining_overlaps() {
     let options = PackOptions::default().with_mode(Mode::Fast {
         iterations: 300,
         swelling: None,
@@ -108,12 +109,12 @@ fn options_out_of_range_are_refused() {
 }
 
 #[test]
-fn a_jam_says_how_far_it_came() {
+fn a_jam_reports_the_fraction_reached() {
     let options = PackOptions::default().with_mode(Mode::Sequential { tries: 2000 });
     let Err(PackError::Jammed(jam)) = try_pack(&[sphere()], 300, 0.5, &options) else {
         panic!("placed one by one at .5")
     };
-    // Random sequential addition ends at .384; two thousand tries come near.
+    // Random sequential addition ends at .384; two thousand tries come close.
     assert!((0.3..0.384).contains(&jam.reached), "{}", jam.reached);
     assert!(jam.placed.len() < jam.count && jam.count == 300 && jam.tries == 2000);
     assert!(jam.to_string().contains("jammed at"));
@@ -126,7 +127,7 @@ fn jam_box(jam: &stereology_anneal::Jam) -> PeriodicBox {
 }
 
 #[test]
-fn no_particles_are_a_packing() {
+fn an_empty_arrangement_is_a_packing() {
     let period = PeriodicBox::new(Vector3::repeat(3.0)).unwrap();
     let packing = pack(
         &Arrangement::new([], vec![], period).unwrap(),
@@ -137,7 +138,7 @@ fn no_particles_are_a_packing() {
     assert!(packing.fraction().abs() < 1e-300 && packing.particles().is_empty());
 }
 
-/// Progress grows from 0 to 1 and can stop the work at any call.
+/// Progress increases from 0 to 1, and every call can cancel the work.
 #[test]
 fn progress_and_cancelling() {
     let grains = mix(&[1.0; 300], &[1.0], 0).unwrap();

@@ -1,4 +1,4 @@
-//! Planes through a packing show what stereology says they show.
+//! Planes through a packing obey the stereological relations.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -7,8 +7,8 @@ use stereology_shape::{Arrangement, Body, UnitBody};
 
 /// Eq. (1): N_A = D N_V, and Delesse: A_A = V_V, on planes through a packing of spheres.
 ///
-/// Averaged over all depths of one period both hold exactly; a section at one depth varies. Profile counts of a packing vary less than Poisson's, so a Poisson
-/// bound at 10⁻⁶ (4.9 standard deviations) over twenty planes holds.
+/// Averaged over all depths of one period both hold exactly; a section at one depth varies. Profile counts of a packing
+/// vary less than Poisson counts, so a Poisson bound at 10⁻⁶ (4.9 standard deviations) over twenty planes is safe.
 #[test]
 fn sections_obey_the_fundamental_relation() {
     let bodies = [UnitBody::new(&Body::sphere(1.0).unwrap())];

@@ -27,7 +27,8 @@ fn bright_pixels(image: &RgbImage) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// A sphere of radius R at distance d projects to a disc of radius R / √(d² − R²) at distance 1, for every position of the camera.
+    /// A sphere of radius R at distance d projects to a disc of radius R / √(d² − R²) at distance 1, for every position
+    /// of the camera.
     #[test]
     fn a_ball_is_a_disc(azimuth in -180.0..180.0_f64, elevation in -80.0..80.0_f64, distance in 3.0..9.0_f64, up_is_z in any::<bool>()) {
         let ball = TriangleMesh::icosphere(2.0, 4);
@@ -177,7 +178,8 @@ fn a_void_is_cut_away() {
         ..Camera::default()
     };
     let target = |mesh: &TriangleMesh, material: &Material<'_>| {
-        // The camera is directed at the centre of the mesh: degenerate triangles at two far corners give both the same centre.
+        // The camera is directed at the centre of the mesh: degenerate triangles at two far corners give both the same
+        // centre.
         let corner = |s: f64| TriangleMesh {
             vertices: vec![Point3::new(s, s, s); 3],
             triangles: vec![[0, 1, 2]],

@@ -6,7 +6,7 @@ use stereology_spectrum::{
     radial_spectrum,
 };
 
-/// Values without structure, from a linear congruence: no dependency on a generator of random numbers.
+/// Pseudo-random values from a linear congruential generator, to avoid a dependency on a random number crate.
 fn noise(seed: u64, n: usize) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     (0..n)
@@ -33,7 +33,7 @@ fn slow_transform(field: &Array3<f64>, k: (usize, usize, usize)) -> Complex<f64>
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Real and complex transforms equal the defining sum at any size, odd and prime included.
+    /// Real and complex transforms equal the defining sum at any size, including odd and prime sizes.
     #[test]
     fn transforms_are_the_defining_sum(nz in 1_usize..6, ny in 1_usize..8, nx in 1_usize..10, seed in 0_u64..1000) {
         let field = Array3::from_shape_vec((nz, ny, nx), noise(seed, nz * ny * nx)).unwrap();
@@ -49,7 +49,7 @@ proptest! {
         }
     }
 
-    /// Inverse after forward is the identity, in both precisions.
+    /// The inverse transform undoes the forward transform, in both precisions.
     #[test]
     fn inverse_undoes_forward(ny in 1_usize..40, nx in 1_usize..40, seed in 0_u64..1000) {
         let field = Array2::from_shape_vec((ny, nx), noise(seed, ny * nx)).unwrap();
@@ -62,9 +62,9 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() < 2e-6));
     }
 
-    /// The radial spectrum holds exactly the variance (Parseval).
+    /// The powers of the radial spectrum sum to the variance (Parseval).
     #[test]
-    fn radial_spectrum_holds_the_variance(ny in 2_usize..40, nx in 2_usize..40, bins in 1_usize..30, seed in 0_u64..1000) {
+    fn radial_spectrum_sums_to_the_variance(ny in 2_usize..40, nx in 2_usize..40, bins in 1_usize..30, seed in 0_u64..1000) {
         let field = Array2::from_shape_vec((ny, nx), noise(seed, ny * nx)).unwrap();
         let spectrum = radial_spectrum(field.view(), bins).unwrap();
         let held: f64 = spectrum.power.iter().zip(&spectrum.count).map(|(p, &c)| p * c as f64).sum();
@@ -73,7 +73,7 @@ proptest! {
         prop_assert_eq!(spectrum.count.iter().sum::<u64>() + 1, (ny * nx) as u64);
     }
 
-    /// The autocovariance is the mean product of wrapped pairs.
+    /// The autocovariance is the mean product of pairs, wrapped around.
     #[test]
     fn autocovariance_is_the_mean_product(ny in 1_usize..9, nx in 1_usize..9, seed in 0_u64..1000) {
         let field = Array2::from_shape_vec((ny, nx), noise(seed, ny * nx)).unwrap();
@@ -88,10 +88,10 @@ proptest! {
         }
     }
 
-    /// The periodic component keeps the mean, and its wrapped Laplacian is the image's own, which knows no neighbours
-    /// beyond the edges (Moisan's definition).
+    /// The periodic component keeps the mean, and its wrapped Laplacian equals the Laplacian of the image without
+    /// neighbours beyond the edges (Moisan's definition).
     #[test]
-    fn periodic_component_takes_only_the_jumps(ny in 4_usize..30, nx in 4_usize..30, seed in 0_u64..1000) {
+    fn periodic_component_removes_only_the_jumps(ny in 4_usize..30, nx in 4_usize..30, seed in 0_u64..1000) {
         let field = Array2::from_shape_vec((ny, nx), noise(seed, ny * nx)).unwrap();
         let periodic = periodic_component(field.view()).unwrap();
         prop_assert!((periodic.mean().unwrap() - field.mean().unwrap()).abs() < 1e-13);
@@ -108,7 +108,7 @@ proptest! {
         }
     }
 
-    /// With a full mask and lag zero, the masked autocovariance is the variance; it ignores what lies outside.
+    /// At lag zero the masked autocovariance is the variance inside the mask; values outside are ignored.
     #[test]
     fn masked_autocovariance_reads_only_the_mask(ny in 3_usize..20, nx in 3_usize..20, seed in 0_u64..1000) {
         let mut field = Array2::from_shape_vec((ny, nx), noise(seed, ny * nx)).unwrap();
@@ -123,8 +123,8 @@ proptest! {
     }
 }
 
-/// Large fields go through the parallel path: the law of the shift theorem holds there too, and one thread gives the
-/// bits of many.
+/// Large fields take the parallel path: it agrees with the defining sum, and its bits do not depend on the number of
+/// threads.
 #[test]
 fn large_fields_have_the_same_bits_at_any_number_of_threads() {
     let shape = [66, 50, 41];
@@ -145,9 +145,9 @@ fn large_fields_have_the_same_bits_at_any_number_of_threads() {
     }
 }
 
-/// Views that are not in C order give the same spectrum as their copies.
+/// Views that are not in C order give the same spectrum as copies in C order.
 #[test]
-fn strided_views_are_read_as_they_are_indexed() {
+fn strided_views_equal_their_copies() {
     let field = Array2::from_shape_vec((12, 9), noise(3, 108)).unwrap();
     let fft = RealFft::new(&[9, 12]).unwrap();
     let turned = fft.forward(field.t()).unwrap();
@@ -155,7 +155,7 @@ fn strided_views_are_read_as_they_are_indexed() {
     assert_eq!(turned, copied);
 }
 
-/// What cannot be transformed is refused by name.
+/// Invalid fields are refused with a specific error.
 #[test]
 fn bad_fields_are_refused() {
     assert!(matches!(RealFft::<f64>::new(&[0, 4]), Err(SpectrumError::Shape { .. })));

@@ -1,8 +1,8 @@
-//! Laws of the transforms, judged by the sum that defines them.
+//! Laws of the transforms, tested against the sum that defines them.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::float_cmp,
-    reason = "tests make small numbers and compare exact ones"
+    reason = "tests use small numbers and compare exact ones"
 )]
 
 mod laws;

@@ -1,7 +1,7 @@
 //! The warnings the program can give: fixed codes, what each means, and what to do about it.
 
 use serde_json::{Value, json};
-pub use stereology::pipeline::Warning;
+pub use stereology::metrics::Finding as Warning;
 
 /// Every code, in alphabetical order: (code, what it means, what to do). `docs/cli.md` and the report show this table.
 pub const CODES: &[(&str, &str, &str)] = &[
@@ -79,6 +79,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "fraction-mismatch",
         "The particles' volume fraction by unfolding and the photograph's area fraction differ by more than 10 %, though on average they must agree.",
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
+    ),
+    (
+        "largest-uncorrected",
+        "The largest profiles are all of one size, so the largest particle size could not be extrapolated; the size of the largest profile was used.",
+        "Give --max-size as a length, or leave it out.",
     ),
     (
         "levels-reduced",
@@ -189,11 +194,6 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "threshold-moved",
         "The smallest size lies inside a profile bin, all of which was left out.",
         "Nothing, or choose --edges with an edge at --min-size.",
-    ),
-    (
-        "types-ignored",
-        "Some profiles of the table have no type, so types were not used.",
-        "Fill the column `type` in every row, or remove it.",
     ),
     (
         "unrealisable-distribution",

@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("sections, exact:       {:?}", made.verification.exact);
     println!("sections, resegmented: {:?}", made.verification.resegmented);
-    for warning in &made.warnings {
+    for warning in &made.findings {
         println!("warning [{}]: {}", warning.code, warning.message);
     }
     if let Some(path) = arguments.get(2) {

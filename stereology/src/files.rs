@@ -402,11 +402,11 @@ fn read_texture(path: &Path, voxel: f64) -> Result<Residual, FileError> {
 /// ```
 /// use std::ops::ControlFlow;
 /// use stereology::files::write_densities;
-/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
 ///
 /// let profiles = MeasuredProfiles { sizes: vec![3.0, 4.0, 5.0], weights: vec![1.0; 3], categories: vec![0; 3], area: 100.0, ..MeasuredProfiles::default() };
 /// let options = DensityOptions { bins: 2, ..DensityOptions::default() };
-/// let densities = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
+/// let densities = unfold_profiles(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// let folder = tempfile::tempdir()?;
 /// write_densities(folder.path().join("densities.csv"), &densities)?;
 /// let table = std::fs::read_to_string(folder.path().join("densities.csv"))?;

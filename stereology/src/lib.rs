@@ -59,6 +59,8 @@ pub use stereology_grid as grid;
 pub use stereology_imaging as imaging;
 #[cfg(feature = "kmatrix")]
 pub use stereology_kmatrix as kmatrix;
+#[cfg(feature = "metrics")]
+pub use stereology_metrics as metrics;
 #[cfg(feature = "microgeometry")]
 pub use stereology_microgeometry as microgeometry;
 #[cfg(feature = "pyramid")]

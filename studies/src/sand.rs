@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
 use stereology::shape::Body;
 use stereology::unfold::{
     Bootstrap, BoundingBox, EdgeRule, Estimate, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel,
@@ -332,7 +332,7 @@ pub fn compare(data: &Path) -> Result<String> {
                 unfold: unfolding,
                 ..DensityOptions::default()
             };
-            let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(()))?.all;
+            let found = unfold_profiles(&profiles, &types, &options, &|_| ControlFlow::Continue(()))?.all;
             threshold = found.threshold;
             row(name, &found, types.unit_bodies()[0].volume())?;
         }

@@ -42,6 +42,35 @@ impl TypesUnfolding {
         }
         self.types.iter_mut().for_each(|of| of.rebin_profiles(edges));
     }
+
+    /// All types as one unfolding, eq. (9): densities, totals and intervals are those of the sum. Method, penalty, evidence and threshold are those of the
+    /// first type; deviance and degrees of freedom are summed; findings stay with their types.
+    #[must_use]
+    pub fn summed(&self) -> Unfolding {
+        let mut sum = self.types[0].clone();
+        sum.number_density.clone_from(&self.number_density);
+        sum.intervals.clone_from(&self.intervals);
+        (sum.total, sum.mean_size, sum.volume_fraction) = (self.total, self.mean_size, self.volume_fraction);
+        (sum.surface_density, sum.distribution) = (self.surface_density, self.distribution.clone());
+        sum.observed.clone_from(&self.observed);
+        sum.refolded.clone_from(&self.refolded);
+        sum.findings.clear();
+        for part in &self.types[1..] {
+            sum.profiles += part.profiles;
+            for (sum, part) in [
+                (&mut sum.profiles_per_area, part.profiles_per_area),
+                (&mut sum.area_fraction, part.area_fraction),
+            ] {
+                sum.observed += part.observed;
+                sum.expected += part.expected;
+            }
+            sum.deviance += part.deviance;
+            sum.degrees_of_freedom += part.degrees_of_freedom;
+            sum.condition_number = sum.condition_number.max(part.condition_number);
+            sum.clamped_bins.extend(&part.clamped_bins);
+        }
+        sum
+    }
 }
 
 /// Unfolds labelled profiles: counts and kernel of each type, on common edges.

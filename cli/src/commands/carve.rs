@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nalgebra::Point3;
-use stereology::pipeline::Warning;
 use stereology::shape::{TriangleMesh, read_mesh, write_coloured_mesh, write_textured_mesh};
 use stereology::volume::{BakeOptions, CarveError, CarveOptions, Solid, turned};
 
@@ -17,6 +16,7 @@ use crate::numbers::counted;
 use crate::outputs::check_file;
 use crate::progress::Step;
 use crate::values::{count, positive};
+use crate::warnings::Warning;
 
 /// Carves a mesh from a finished solid: writes it with the solid's texture as colours of its vertices
 ///

@@ -289,8 +289,9 @@ impl Synthesize {
                     "particles": report(&synthesis.details.particles),
                 }),
             )
-            .field("verification", object(compared));
-        for warning in &synthesis.warnings {
+            .field("verification", object(compared))
+            .field("verdict", json!(synthesis.verdict));
+        for warning in &synthesis.findings {
             answer.warn(warning.clone());
         }
         let exact = &verification.exact;

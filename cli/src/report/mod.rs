@@ -12,9 +12,9 @@ mod trust;
 pub use measures::{MeasureReport, measures_page};
 pub use of_synthesis::{Pictures, report_input};
 pub use page::page;
-pub use trust::{Grade, Verdict, verdict};
 
 use image::RgbImage;
+use stereology::pipeline::{ResidualSpectra, Verdict};
 
 use crate::warnings::Warning;
 
@@ -31,6 +31,8 @@ pub struct ReportInput {
     pub parameters: Vec<(String, String)>,
     /// Every warning of every step.
     pub warnings: Vec<Warning>,
+    /// Whether to trust the result.
+    pub verdict: Verdict,
     /// Photograph and what was found on it.
     pub photo: PhotoFigures,
     /// Profiles and particles by size.
@@ -123,10 +125,6 @@ pub struct PackingFigures {
     pub fraction: f64,
     /// The fraction asked for.
     pub requested_fraction: f64,
-    /// Largest penetration over the mean size.
-    pub max_overlap: f64,
-    /// Did the separate pass find no overlap?
-    pub certified: bool,
     /// Rounds of relaxation.
     pub iterations: u64,
     /// One period of the solid with three faces seen.
@@ -144,8 +142,8 @@ pub struct ComparisonFigures {
     pub resegmented: Option<SectionFigures>,
     /// Profile size histogram of the exact sections over `SizeFigures::profile_edges`, scaled to the photograph's area.
     pub profiles_synthetic: Vec<f64>,
-    /// Radial power spectrum of the residual: cycles per pixel, photograph, slices of the residual volume.
-    pub spectrum: Option<Spectrum>,
+    /// Radial power spectra of the residual in photograph and sections.
+    pub spectrum: Option<ResidualSpectra>,
 }
 
 /// How sections of the solid compare with the photograph.
@@ -161,49 +159,6 @@ pub struct SectionFigures {
     pub area_fraction_synthetic: f64,
     /// Distance of the colours (Wasserstein-1, mean over channels), encoded, 0 to 1.
     pub colour_distance: f64,
-}
-
-/// Radial power spectra of the residual.
-#[derive(Clone, Debug)]
-pub struct Spectrum {
-    /// Cycles per pixel, up to one half.
-    pub frequency: Vec<f64>,
-    /// Power in the photograph's residual.
-    pub photo: Vec<f64>,
-    /// Power in slices of the residual volume, mean over the three axes.
-    pub slices: Vec<f64>,
-}
-
-impl Spectrum {
-    /// Root mean square of log10 of the ratio, each fineness weighted by its share of the photograph's variance: 0.3 is a factor of two.
-    pub fn log_error(&self) -> f64 {
-        let mut sums = [0.0; 2];
-        for (frequency, photo, ratio) in self.ratios() {
-            // A ring of frequencies holds as many of them as it is long.
-            let weight = frequency * photo;
-            sums[0] += weight * ratio.log10().powi(2);
-            sums[1] += weight;
-        }
-        (sums[0] / sums[1]).sqrt()
-    }
-
-    /// The frequency where slices and photograph are farthest apart, and power in slices over that in the photograph there.
-    pub fn worst(&self) -> Option<(f64, f64)> {
-        let by_distance = |ratio: &f64| ratio.log10().abs();
-        self.ratios()
-            .map(|(frequency, _, ratio)| (frequency, ratio))
-            .max_by(|a, b| by_distance(&a.1).total_cmp(&by_distance(&b.1)))
-    }
-
-    /// Frequency, power in the photograph, and power in slices over it, where both have any.
-    fn ratios(&self) -> impl Iterator<Item = (f64, f64, f64)> {
-        let powers = self.photo.iter().zip(&self.slices);
-        self.frequency
-            .iter()
-            .zip(powers)
-            .filter(|(_, (photo, slices))| **photo > 0.0 && **slices > 0.0)
-            .map(|(&frequency, (&photo, &slices))| (frequency, photo, slices / photo))
-    }
 }
 
 #[cfg(test)]

@@ -2,12 +2,11 @@
 
 use image::RgbImage;
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{Comparison, ParticleTypes, Synthesis, residual_spectra};
+use stereology::pipeline::{Comparison, ParticleTypes, Synthesis};
 use stereology::unfold::Interval;
 
 use super::{
     CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures,
-    Spectrum,
 };
 use crate::arguments::Invocation;
 
@@ -34,7 +33,8 @@ pub fn report_input(
         unit: if (pixel - 1.0).abs() < 1e-12 { "px" } else { "units" }.to_owned(),
         command: invocation.command.clone(),
         parameters: invocation.parameters.clone(),
-        warnings: synthesis.warnings.clone(),
+        warnings: synthesis.findings.clone(),
+        verdict: synthesis.verdict.clone(),
         photo: photo(synthesis, pixel),
         sizes: sizes(synthesis, types),
         packing: PackingFigures {
@@ -42,8 +42,6 @@ pub fn report_input(
             sides: synthesis.packing.sides().into(),
             fraction: synthesis.packing.fraction(),
             requested_fraction: synthesis.population.fraction,
-            max_overlap: synthesis.packing.max_overlap(),
-            certified: synthesis.packing.max_overlap() <= 0.0,
             iterations: synthesis.packing.iterations() as u64,
             cube: pictures.cube.clone(),
         },
@@ -136,20 +134,9 @@ fn comparison(synthesis: &Synthesis, pictures: Pictures) -> ComparisonFigures {
             &synthesis.densities.profile_edges,
             synthesis.profiles.area / found.section_area,
         ),
-        spectrum: spectrum(synthesis),
+        spectrum: synthesis.spectra.clone(),
         sections: pictures.sections,
     }
-}
-
-/// Power of the residual, photograph and sections: what mean colours do not explain.
-fn spectrum(synthesis: &Synthesis) -> Option<Spectrum> {
-    let pixel = synthesis.details.residual.voxel;
-    let found = residual_spectra(&synthesis.segmentation, &synthesis.solid, pixel).ok()?;
-    Some(Spectrum {
-        frequency: found.frequency,
-        photo: found.photo,
-        slices: found.sections,
-    })
 }
 
 /// How many values lie in each bin (a, b], times `weight`.

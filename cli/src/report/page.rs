@@ -3,17 +3,15 @@
 use std::fmt::Write;
 
 use image::RgbImage;
+use stereology::pipeline::{Check, CheckName, Level};
 
-use super::{
-    ComparisonFigures, Grade, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures, Verdict,
-};
-use super::{pictures, plots, trust::degrees_of_freedom, verdict};
+use super::{ComparisonFigures, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures};
+use super::{pictures, plots, trust};
 use crate::numbers::{counted, percent, significant};
 use crate::warnings::advice;
 
 /// The report as HTML.
 pub fn page(input: &ReportInput) -> String {
-    let verdict = verdict(input);
     let mut html = String::with_capacity(1 << 20);
     let _ = write!(
         html,
@@ -30,28 +28,31 @@ pub fn page(input: &ReportInput) -> String {
             escaped(&input.unit)
         },
     );
-    trust(&mut html, input, &verdict);
+    verdict(&mut html, input);
     all_warnings(&mut html, input);
     comparison(&mut html, &input.comparison, &input.photo);
     photograph(&mut html, &input.photo, &input.unit);
     sizes(&mut html, &input.sizes, &input.comparison, &input.unit);
-    packing(&mut html, &input.packing, &input.unit);
+    packing(&mut html, input);
     texture(&mut html, &input.comparison);
     repeat(&mut html, input);
     html.push_str("</body>\n</html>\n");
     html
 }
 
-fn trust(html: &mut String, input: &ReportInput, verdict: &Verdict) {
-    let (colour, word) = match verdict.grade {
-        Grade::Good => ("good", "Trustworthy"),
-        Grade::Fair => ("fair", "Trustworthy with care"),
-        Grade::Poor => ("poor", "Not trustworthy yet"),
+fn verdict(html: &mut String, input: &ReportInput) {
+    let level = input.verdict.level();
+    let word = match level {
+        Level::Good => "Trustworthy",
+        Level::Care => "Trustworthy with care",
+        Level::Bad => "Not trustworthy yet",
     };
     let _ = writeln!(
         html,
-        "<div class=\"verdict {colour}\"><strong>{word}</strong><p>{}</p></div>",
-        escaped(&verdict.sentence)
+        "<div class=\"verdict {}\"><strong>{word}</strong><p>{} {}</p></div>",
+        class(level),
+        escaped(&trust::sentence(&input.verdict)),
+        escaped(&trust::opinions(&input.verdict))
     );
     let unit = &input.unit;
     let interval = |interval: Option<(f64, f64)>| {
@@ -92,18 +93,15 @@ fn trust(html: &mut String, input: &ReportInput, verdict: &Verdict) {
     }
     html.push_str("</div>\n");
 
-    let weak: Vec<_> = verdict
-        .checks
-        .iter()
-        .filter(|check| check.grade != Grade::Good)
-        .collect();
+    let rows = trust::rows(input);
+    let weak: Vec<_> = rows.iter().filter(|check| check.level != Level::Good).collect();
     if !weak.is_empty() {
         html.push_str("<h3>Where the result is weak</h3>\n<ul>\n");
         for check in weak {
             let _ = writeln!(
                 html,
                 "<li><strong class=\"{}\">{}</strong>: {}. {}</li>",
-                class(check.grade),
+                class(check.level),
                 check.name,
                 escaped(&check.found),
                 check.meaning
@@ -112,30 +110,26 @@ fn trust(html: &mut String, input: &ReportInput, verdict: &Verdict) {
         html.push_str("</ul>\n");
     }
     html.push_str("<h3>All checks</h3>\n<table>\n<tr><th>Check</th><th>Found</th><th>Should be</th><th></th></tr>\n");
-    for check in &verdict.checks {
+    for check in &rows {
         let _ = writeln!(
             html,
             "<tr title=\"{}\"><td>{}</td><td>{}</td><td>{}</td><td class=\"{}\">{}</td></tr>",
             escaped(check.meaning),
             check.name,
             escaped(&check.found),
-            check.should_be,
-            class(check.grade),
-            match check.grade {
-                Grade::Good => "good",
-                Grade::Fair => "fair",
-                Grade::Poor => "poor",
-            }
+            escaped(&check.should_be),
+            class(check.level),
+            trust::word(check.level)
         );
     }
     html.push_str("</table>\n");
 }
 
-fn class(grade: Grade) -> &'static str {
-    match grade {
-        Grade::Good => "good",
-        Grade::Fair => "fair",
-        Grade::Poor => "poor",
+fn class(level: Level) -> &'static str {
+    match level {
+        Level::Good => "good",
+        Level::Care => "fair",
+        Level::Bad => "poor",
     }
 }
 
@@ -153,7 +147,7 @@ fn all_warnings(html: &mut String, input: &ReportInput) {
         let _ = writeln!(
             html,
             "<li><code>{}</code> {}{to_do}</li>",
-            escaped(&warning.code),
+            escaped(warning.code),
             escaped(&sentence(&warning.message))
         );
     }
@@ -277,7 +271,7 @@ fn sizes(html: &mut String, sizes: &SizeFigures, comparison: &ComparisonFigures,
             format!(
                 "{} for {} degrees of freedom",
                 significant(sizes.deviance),
-                significant(degrees_of_freedom(sizes))
+                significant(sizes.degrees_of_freedom)
             ),
         ),
         (
@@ -295,7 +289,19 @@ fn sizes(html: &mut String, sizes: &SizeFigures, comparison: &ComparisonFigures,
     table(html, &rows);
 }
 
-fn packing(html: &mut String, packing: &PackingFigures, unit: &str) {
+fn packing(html: &mut String, input: &ReportInput) {
+    let (packing, unit): (&PackingFigures, _) = (&input.packing, &input.unit);
+    let of_overlap = |check: &&Check| check.name == CheckName::Overlap;
+    let overlap = match input.verdict.checks.iter().find(of_overlap) {
+        Some(check) if check.level == Level::Good => {
+            format!(
+                "none, by a separate pass over all pairs: {}",
+                trust::overlap(check.value)
+            )
+        }
+        Some(check) => trust::overlap(check.value),
+        None => "unknown".to_owned(),
+    };
     html.push_str("<h2>The solid</h2>\n<div class=\"row\">\n");
     let _ = writeln!(
         html,
@@ -310,14 +316,7 @@ fn packing(html: &mut String, packing: &PackingFigures, unit: &str) {
             (format!("Box ({unit})"), sides.join(" x ")),
             ("Fraction inside particles".to_owned(), percent(packing.fraction)),
             ("Fraction asked for".to_owned(), percent(packing.requested_fraction)),
-            (
-                "Overlap".to_owned(),
-                if packing.certified {
-                    "none: certified by a separate pass over all pairs".to_owned()
-                } else {
-                    format!("up to {} of the mean size", significant(packing.max_overlap))
-                },
-            ),
+            ("Overlap".to_owned(), overlap),
             ("Rounds of relaxation".to_owned(), counted(packing.iterations)),
         ],
     );

@@ -5,7 +5,9 @@ use std::ops::Range;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{SizeFigures, Spectrum};
+use stereology::pipeline::ResidualSpectra;
+
+use super::SizeFigures;
 
 const SIZE: (u32, u32) = (520, 320);
 const BARS: RGBColor = RGBColor(168, 187, 206);
@@ -82,7 +84,7 @@ pub(super) fn particles(sizes: &SizeFigures, unit: &str) -> String {
 }
 
 /// Power spectra of the residual.
-pub(super) fn spectra(spectrum: &Spectrum) -> String {
+pub(super) fn spectra(spectrum: &ResidualSpectra) -> String {
     drawn(
         &[(INK, "photograph"), (SOLID, "slices of the residual volume")],
         |area| {
@@ -95,7 +97,7 @@ pub(super) fn spectra(spectrum: &Spectrum) -> String {
                     .filter(|&(f, p)| f > 0.0 && p > 0.0)
                     .collect()
             };
-            let (photo, slices) = (positive(&spectrum.photo), positive(&spectrum.slices));
+            let (photo, slices) = (positive(&spectrum.photo), positive(&spectrum.sections));
             let powers = || photo.iter().chain(&slices).map(|point| point.1);
             let low = powers().fold(f64::INFINITY, f64::min);
             let high = powers().fold(0.0, f64::max);

@@ -1,10 +1,11 @@
 //! The report of a made-up result.
 
 use image::{Rgb, RgbImage};
+use stereology::pipeline::{Comparison, Evidence, Level, ResidualSpectra, Verdict};
+use stereology::unfold::{Estimate, Interval};
 
 use super::{
-    CategoryFigures, ComparisonFigures, Grade, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures,
-    Spectrum, page, verdict,
+    CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures, page,
 };
 use crate::warnings::Warning;
 
@@ -22,7 +23,41 @@ fn picture(width: u32, height: u32, shift: u32) -> RgbImage {
     })
 }
 
+fn made_up_verdict(findings: &[Warning]) -> Verdict {
+    let exact = Comparison {
+        profiles_photo: 335,
+        profiles_synthetic: 5200,
+        size_w1: 0.046,
+        area_fraction_photo: 0.41,
+        area_fraction_synthetic: 0.405,
+        colour_distance: 0.011,
+    };
+    Verdict::new(&Evidence {
+        findings: findings.to_vec(),
+        profiles: 335,
+        deviance: 8.1,
+        degrees_of_freedom: 7,
+        total: Estimate {
+            value: 2.4e-4,
+            interval: Some(Interval {
+                lower: 2.1e-4,
+                upper: 2.8e-4,
+            }),
+        },
+        volume_fraction: 0.43,
+        area_fraction: 0.41,
+        smallest_gap: 2e-4,
+        exact,
+        resegmented: Some(Comparison { size_w1: 0.12, ..exact }),
+        texture_error: Some(0.08),
+    })
+}
+
 fn made_up() -> ReportInput {
+    let warnings = vec![Warning::new(
+        "near-minimum",
+        "14 % of the profiles are below twice the smallest area (30 px)",
+    )];
     let edges: Vec<f64> = (0..=10).map(|i| 4.0 * f64::from(i)).collect();
     let observed = vec![12.0, 40.0, 66.0, 71.0, 58.0, 44.0, 25.0, 12.0, 5.0, 2.0];
     let exact = SectionFigures {
@@ -40,10 +75,8 @@ fn made_up() -> ReportInput {
             ("--bins".to_owned(), "10".to_owned()),
             ("--seed".to_owned(), "0".to_owned()),
         ],
-        warnings: vec![Warning::new(
-            "near-minimum",
-            "14 % of the profiles are below twice the smallest area (30 px)",
-        )],
+        verdict: made_up_verdict(&warnings),
+        warnings,
         photo: PhotoFigures {
             picture: picture(480, 320, 0),
             overlay: picture(480, 320, 0),
@@ -105,8 +138,6 @@ fn made_up() -> ReportInput {
             sides: [256.0; 3],
             fraction: 0.41,
             requested_fraction: 0.41,
-            max_overlap: 0.0,
-            certified: true,
             iterations: 214,
             cube: picture(300, 300, 5),
         },
@@ -115,10 +146,10 @@ fn made_up() -> ReportInput {
             exact,
             resegmented: Some(SectionFigures { size_w1: 0.12, ..exact }),
             profiles_synthetic: observed.iter().map(|n| 1.03 * n).collect(),
-            spectrum: Some(Spectrum {
+            spectrum: Some(ResidualSpectra {
                 frequency: (1..=32).map(|i| f64::from(i) / 64.0).collect(),
                 photo: (1..=32).map(|i| 1.0 / f64::from(i * i)).collect(),
-                slices: (1..=32).map(|i| 1.2 / f64::from(i * i)).collect(),
+                sections: (1..=32).map(|i| 1.2 / f64::from(i * i)).collect(),
             }),
         },
     }
@@ -153,19 +184,17 @@ fn a_page_stands_alone() {
     assert_eq!(html, page(&made_up()));
 }
 
+/// The page shows the level of the verdict, and where it is weak.
 #[test]
-fn the_verdict_is_the_worst_check() {
+fn the_page_shows_the_verdict() {
     let mut input = made_up();
-    assert_eq!(verdict(&input).grade, Grade::Fair); // a warning about small profiles
-    input.warnings.clear();
-    assert_eq!(verdict(&input).grade, Grade::Good);
-    input.photo.profiles = 60;
-    assert_eq!(verdict(&input).grade, Grade::Fair);
-    input.packing.certified = false;
-    assert_eq!(verdict(&input).grade, Grade::Poor);
-    input = made_up();
-    input.comparison.exact.size_w1 = f64::NAN;
-    assert_eq!(verdict(&input).grade, Grade::Poor, "what is not known is not good");
+    assert_eq!(input.verdict.level(), Level::Care); // a warning about small profiles
+    let html = page(&input);
+    assert!(html.contains("Trustworthy with care") && html.contains("Numbers: with care (outlines of the profiles)"));
+    assert!(html.contains("smallest gap 0.0002 of the mean size"));
+    input.verdict = made_up_verdict(&[]);
+    let html = page(&input);
+    assert!(html.contains("All 12 checks are good") && html.contains("Numbers: good. Appearance: good."));
 }
 
 #[test]
@@ -177,10 +206,10 @@ fn nothing_found_is_still_a_page() {
     input.sizes.packed = vec![0.0; 10];
     input.sizes.interval = None;
     input.comparison.profiles_synthetic = Vec::new();
-    input.comparison.spectrum = Some(Spectrum {
+    input.comparison.spectrum = Some(ResidualSpectra {
         frequency: vec![0.1],
         photo: vec![0.0],
-        slices: vec![0.0],
+        sections: vec![0.0],
     });
     input.comparison.resegmented = None;
     let html = page(&input);

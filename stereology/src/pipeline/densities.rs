@@ -1,295 +1,349 @@
-//! From measured profiles to particles per volume, colour category by colour category where size and colour go together.
+//! From measured profiles to particles per volume: all particles together, by particle type and by colour category.
 
-use crate::pipeline::association::{Association, association};
+use std::ops::ControlFlow;
+
 use crate::pipeline::fitting::Fitting;
-use crate::pipeline::{Capping, LargestSize, ParticleTypes, ParticleTypesError, Spacing, Warning};
-use stereology_kmatrix::Sizes;
-use stereology_unfold::{
-    Kernel, Method, ProfilesError, UnfoldError, UnfoldOptions, Unfolding, divided_edges, unfold, unfold_with_progress,
+use crate::pipeline::{
+    Association, DensityError, DensityOptions, LargestSize, MeasuredProfiles, ParticleTypes, SeparateCategories,
+    Settled, association,
 };
+use stereology_kmatrix::Sizes;
+use stereology_metrics::{Finding, Progress};
+use stereology_unfold::{TypesUnfolding, UnfoldOptions, Unfolding, unfold_types_with_progress, unfold_with_progress};
 
-/// What was measured on the photograph: one entry a profile in each.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MeasuredProfiles {
-    /// Diameters of the circles of their areas; lengths.
-    pub sizes: Vec<f64>,
-    /// How much each counts: 0 outside the counting frame.
-    pub weights: Vec<f64>,
-    /// Colour categories, from 0.
-    pub categories: Vec<u8>,
-    /// Slices they are on, from 0, one a profile; empty if there is one slice, or it is not known.
-    pub slices: Vec<usize>,
-    /// Types of the particles they are cuts of, from 0, one a profile; empty if it is not known.
-    pub types: Vec<usize>,
-    /// Area examined; length squared.
-    pub area: f64,
-    /// Profiles up to this size are lost.
-    pub min_size: f64,
-}
-
-/// How to unfold them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DensityOptions {
-    /// Size bins between 0 and the largest size; 0: as many as the profiles bear ([`automatic_bins`](stereology_unfold::automatic_bins)).
-    pub bins: usize,
-    /// How they are spaced.
-    pub spacing: Spacing,
-    /// Edges of the size bins instead.
-    pub edges: Option<Vec<f64>>,
-    /// Largest particle size; by default that of the largest counted profile.
-    pub max_size: LargestSize,
-    /// Profiles lost at the rims of particles.
-    pub capping: Capping,
-    /// Where in a bin its particles' sizes lie.
-    pub sizes: Sizes,
-    /// The estimator, its threshold and intervals. Without a threshold that of the profiles is used.
-    pub unfold: UnfoldOptions,
-}
-
-impl Default for DensityOptions {
-    /// 16 bins (ten leave steps in the profile sizes of the sections), sizes spread over them, the default estimator without intervals.
-    fn default() -> Self {
-        Self {
-            bins: 16,
-            spacing: Spacing::Equal,
-            edges: None,
-            max_size: LargestSize::Profile,
-            capping: Capping::None,
-            sizes: Sizes::Integrated,
-            unfold: UnfoldOptions::default(),
-        }
-    }
-}
-
-/// Particles per volume, all together and by category.
+/// Particles per volume: all together, by particle type, by colour category; and what was chosen on the way.
 #[derive(Clone, Debug)]
 pub struct ParticleDensities {
     /// All particles together.
     pub all: Unfolding,
-    /// Number density by category and size bin, to populate a solid with; `None` in bins wholly below the threshold. Category c is entry c.
+    /// Each particle type, if there are several and the type of every profile is known; `all` is then their sum.
+    pub by_type: Vec<Unfolding>,
+    /// Each colour category unfolded separately, if that was requested or sizes differ between categories.
+    pub categories: Option<CategoryDensities>,
+    /// Number density by category and size bin, from which a solid is populated; `None` in bins wholly below the threshold. Category c is entry c.
     pub by_category: Vec<Vec<Option<f64>>>,
-    /// Whether size and colour go together.
+    /// Whether sizes differ between colour categories.
     pub association: Association,
-    /// Where in a bin its particles' sizes lie.
+    /// The particle types, with the fractions of the fit.
+    pub types: ParticleTypes,
+    /// Sizes of the particles within a bin.
     pub sizes: Sizes,
     /// Edges of the bins in which `all.observed` and `all.refolded` count profiles.
     pub profile_edges: Vec<f64>,
+    /// What was chosen or estimated before the fit.
+    pub settled: Settled,
+    /// Remarks: those of `all` and of each type, then `fewer-bins` and `largest-uncorrected`.
+    pub findings: Vec<Finding>,
 }
 
-/// Profiles that cannot be unfolded.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DensityError {
-    /// No profile counts.
-    #[error(
-        "no profile counts: all {0} lie outside the counting frame or touch the edge; take a larger photograph or --edge-rule all"
-    )]
-    NoProfiles(usize),
-    /// Geometric bins of sizes that do not bear them.
-    #[error(
-        "bins of equal ratio need two or more of them, and sizes that differ (smallest {smallest}, largest {largest}): give both sizes, or take equal bins"
-    )]
-    Spacing {
-        /// The smallest size.
-        smallest: f64,
-        /// The largest.
-        largest: f64,
-    },
-    /// A type there is no body for, or a type without profiles.
-    #[error("{0}")]
-    Labels(String),
-    /// The profiles.
-    #[error(transparent)]
-    Profiles(#[from] ProfilesError),
-    /// The types of particle.
-    #[error(transparent)]
-    Types(#[from] ParticleTypesError),
-    /// The unfolding.
-    #[error(transparent)]
-    Unfold(#[from] UnfoldError),
+/// Colour categories unfolded separately, on common bins.
+#[derive(Clone, Debug)]
+pub struct CategoryDensities {
+    /// Category of each entry of `found.types`, in increasing order.
+    pub categories: Vec<u8>,
+    /// Particle type of each entry, if the types of the profiles are known.
+    pub kinds: Vec<Option<usize>>,
+    /// Each entry separately, and their sum, with intervals if requested.
+    pub found: TypesUnfolding,
 }
 
-/// Unfolds the profiles with the kernel of `types`.
+/// Unfolds profiles to particles per volume.
 ///
-/// Where sizes differ between colour categories (Kruskal-Wallis, p below 0.01) each category is unfolded by itself on common edges, section 4.2;
-/// else all share one distribution and each category has its share of the profiles.
+/// First the size bins, the threshold, the capping angle and the fractions of the types are settled ([`DensityOptions`]). Then:
+///
+/// - If the type of every profile is known (`profiles.types`) and there are several types, each type is unfolded with its own kernel, eq. (9), and `all` is
+///   their sum. Otherwise all profiles are unfolded with the joint kernel of `types`, eqs. (10)-(12).
+/// - Where sizes differ between colour categories (Kruskal-Wallis, p below 0.01), each category is also unfolded separately on the same bins, section 4.2.
+///   Otherwise all categories have the same size distribution, and each has its fraction of the profiles.
+///
+/// A category with no profile above the threshold has zero density.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: nothing to count, sizes beyond the largest, bad bins, a cancelled run.
+/// [`DensityError`]: no counted profile, sizes beyond the largest, invalid bins, profiles of unknown types, types without profiles, a cancelled run.
 ///
 /// # Examples
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, particle_densities};
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
 ///
 /// // Cuts through spheres of diameter 10, at evenly spread depths: N_A = D N_V.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
-/// let found = particle_densities(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
+/// let found = unfold_profiles(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// assert!((found.all.total.value / (300.0 / 1e5 / 10.0) - 1.0).abs() < 0.15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn particle_densities(
+///
+/// Profiles of two known types, each with its own kernel:
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
+///
+/// let cuts = |i: i32| 10.0 * (1.0 - ((f64::from(i % 300) + 0.5) / 300.0).powi(2)).sqrt();
+/// let sizes: Vec<f64> = (0..600).map(cuts).collect();
+/// let types = (0..600).map(|i| i / 300).collect();
+/// let profiles = MeasuredProfiles { weights: vec![1.0; 600], categories: vec![0; 600], types, area: 1e5, sizes, ..MeasuredProfiles::default() };
+/// let spheres = ParticleTypes::parse(&["sphere", "sphere"])?;
+/// let found = unfold_profiles(&profiles, &spheres, &DensityOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// assert!((found.all.total.value - 2.0 * found.by_type[0].total.value).abs() < 1e-9 * found.all.total.value);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # References
+///
+/// Jagnow, Dorsey & Rushmeier 2004, sections 3.3 and 4.2.
+pub fn unfold_profiles(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,
     options: &DensityOptions,
-    progress: stereology_unfold::Progress<'_>,
+    progress: Progress<'_>,
 ) -> Result<ParticleDensities, DensityError> {
+    check_types(profiles, types)?;
     let fitting = Fitting::new(profiles, types, options)?;
-    let places = fitting.counted();
-    let (counts, kernel) = fitting.part(&places, None)?;
-    let mut all = unfold_with_progress(&counts, &kernel, &fitting.unfold, progress)?;
-    all.findings = fitting.cured(&all.findings, &places, None);
-    if let Some(edges) = fitting.histogram_edges() {
-        all.rebin_profiles(&edges);
-    }
-    let profile_edges = all.profile_edges.clone();
-    let of_category = |category: usize| -> Vec<usize> {
-        places
-            .iter()
-            .copied()
-            .filter(|&i| usize::from(profiles.categories[i]) == category)
-            .collect()
+    let counted = profiles.counted()?;
+    let labelled = types.types().len() > 1 && profiles.have_types();
+    let by_colour = by_category(profiles, &counted);
+    let sizes_of = |places: &Vec<usize>| places.iter().map(|&i| profiles.sizes[i]).collect::<Vec<f64>>();
+    let association = association(&by_colour.iter().map(sizes_of).collect::<Vec<_>>());
+
+    let several = by_colour.iter().filter(|places| !places.is_empty()).count() > 1;
+    let separate = several && options.categories == SeparateCategories::Always;
+    // Fits with intervals take nearly all of the time.
+    let part = if separate { 0.5 } else { 1.0 };
+    let first = |done: f64| progress(part * done);
+    let (all, by_type) = if labelled {
+        let found = unfold_types(&fitting, &counted, &first)?;
+        (found.summed(), found.types)
+    } else {
+        (unfold_together(&fitting, &counted, &first)?, Vec::new())
     };
-    let categories = places
-        .iter()
-        .map(|&i| usize::from(profiles.categories[i]) + 1)
-        .max()
-        .unwrap_or(1);
-    let groups: Vec<Vec<usize>> = (0..categories).map(of_category).collect();
-    let sizes_of = |group: &Vec<usize>| group.iter().map(|&i| profiles.sizes[i]).collect::<Vec<f64>>();
-    let association = association(&groups.iter().map(sizes_of).collect::<Vec<_>>());
-    let without_intervals = UnfoldOptions {
-        bootstrap: None,
-        ..fitting.unfold
+    let categories = if separate {
+        let groups = category_groups(&fitting, &by_colour, labelled);
+        unfold_categories(&fitting, groups, &fitting.unfold, &|done| progress(part + part * done))?
+    } else if association.together {
+        let groups = category_groups(&fitting, &by_colour, false);
+        let without_intervals = UnfoldOptions {
+            bootstrap: None,
+            ..fitting.unfold
+        };
+        unfold_categories(&fitting, groups, &without_intervals, &|_| ControlFlow::Continue(()))?
+    } else {
+        None
     };
-    let weight_of = |group: &[usize]| group.iter().map(|&i| profiles.weights[i]).sum::<f64>();
-    let whole = weight_of(&places);
-    let by_category = groups
-        .iter()
-        .map(|group| {
-            if association.together && !group.is_empty() {
-                let (counts, kernel) = fitting.part(group, None)?;
-                return Ok(unfold(&counts, &kernel, &without_intervals)?.number_density);
-            }
-            let share = weight_of(group) / whole;
-            Ok(all
-                .number_density
-                .iter()
-                .map(|density| density.map(|n| n * share))
-                .collect())
-        })
-        .collect::<Result<_, DensityError>>()?;
+    let by_category = match &categories {
+        Some(separate) if association.together => summed_by_category(separate, &all, by_colour.len()),
+        _ => fractions_by_category(profiles, &all, &by_colour),
+    };
     Ok(ParticleDensities {
-        all,
+        findings: findings(&all, &by_type, counted.len(), &fitting.settled, options),
+        by_type,
+        categories,
         by_category,
         association,
+        types: fitting.types.into_owned(),
         sizes: options.sizes,
-        profile_edges,
+        profile_edges: all.profile_edges.clone(),
+        settled: fitting.settled,
+        all,
     })
 }
 
-/// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
-/// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
-#[derive(Clone, Debug, PartialEq)]
-pub struct UnfoldingBins {
-    /// Edges of the profile bins.
-    pub profile_edges: Vec<f64>,
-    /// Edges of the size bins of the kernel; those of the reported bins are among them.
-    pub size_edges: Vec<f64>,
-}
-
-/// A hundred profile bins or more lose nothing that shows in the densities.
-const PROFILE_BINS: usize = 100;
-/// Forty size bins or more make the smooth estimate as smooth as can be seen.
-const SIZE_BINS: usize = 40;
-
-impl UnfoldingBins {
-    /// Bins for densities in the bins between `edges`, from a threshold (0: none) on.
-    ///
-    /// ```
-    /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
-    /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Auto, Sizes::Integrated);
-    /// assert_eq!((bins.profile_edges.len(), bins.size_edges.len()), (101, 41));
-    /// ```
-    #[must_use]
-    pub fn new(edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> Self {
-        if method == Method::Paper {
-            return Self {
-                profile_edges: edges.to_vec(),
-                size_edges: edges.to_vec(),
-            };
-        }
-        Self {
-            profile_edges: divided_edges(edges, PROFILE_BINS, threshold),
-            size_edges: match sizes {
-                Sizes::Integrated => divided_edges(edges, SIZE_BINS, threshold),
-                Sizes::UpperEdge => edges.to_vec(),
-            },
-        }
-    }
-}
-
-/// The highest profile bin is widened until it holds this share of the profiles of the largest particles. A body's largest section may hardly ever be met (for
-/// a mesh: never, by any plane that was tried), and a profile there would not be explained, or count for far too many particles.
-const TOP_SHARE: f64 = 0.01;
-
-impl ParticleTypes {
-    /// [`UnfoldingBins::new`] with the highest profile bin so wide that every type shows profiles in it.
-    ///
-    /// ```
-    /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
-    /// let edges = [0.0, 0.5, 1.0];
-    /// let top = |shape: &str| {
-    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.0, Method::Auto, Sizes::Integrated);
-    ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
-    /// };
-    /// assert_eq!(top("sphere")?, 0.99);
-    /// assert!(top("box:1,1,2")? < 0.99); // hardly ever cut through two opposite edges
-    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
-    /// ```
-    #[must_use]
-    pub fn unfolding_bins(&self, edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> UnfoldingBins {
-        let mut bins = UnfoldingBins::new(edges, threshold, method, sizes);
-        let (Some(&largest), false) = (edges.last(), method == Method::Paper) else {
-            return bins;
-        };
-        let shown = |edge: f64| {
-            let shares = self.types().iter().map(|of| 1.0 - of.law().cdf(edge / largest));
-            shares.fold(1.0, f64::min) >= TOP_SHARE
-        };
-        let inner = bins.profile_edges.len() - 1;
-        let kept = (1..inner).rev().find(|&k| shown(bins.profile_edges[k])).unwrap_or(0);
-        bins.profile_edges.drain(kept + 1..inner);
-        bins
-    }
-}
-
-/// The kernel with its bins summed to those between `edges`.
-pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityError> {
-    kernel
-        .reported_in(edges)
-        .map_err(|error| DensityError::Unfold(UnfoldError::Reported(error)))
-}
-
 impl ParticleDensities {
-    /// Number density of a size bin, the categories added up; `None` below the threshold.
+    /// Number density of a size bin, summed over the categories; `None` below the threshold.
     #[must_use]
     pub fn combined(&self, bin: usize) -> Option<f64> {
         let known: Vec<f64> = self.by_category.iter().filter_map(|category| category[bin]).collect();
         (!known.is_empty()).then(|| known.iter().sum())
     }
+}
 
-    /// What a reader should know.
-    #[must_use]
-    pub fn warnings(&self) -> Vec<Warning> {
-        self.all
-            .findings
-            .iter()
-            .map(|finding| Warning::new(finding.code, finding.message.clone()))
-            .collect()
+/// Checks the types of the profiles, if they are known.
+fn check_types(profiles: &MeasuredProfiles, types: &ParticleTypes) -> Result<(), DensityError> {
+    if profiles.types.is_empty() {
+        return Ok(());
     }
+    if !profiles.have_types() {
+        return Err(DensityError::SomeTypes {
+            types: profiles.types.len(),
+            profiles: profiles.sizes.len(),
+        });
+    }
+    let types = types.types().len();
+    match profiles.types.iter().find(|&&kind| kind >= types) {
+        Some(&found) => Err(DensityError::UnknownType { found, types }),
+        None => Ok(()),
+    }
+}
+
+/// The counted profiles of each category; entry c is category c.
+fn by_category(profiles: &MeasuredProfiles, counted: &[usize]) -> Vec<Vec<usize>> {
+    let category = |i: usize| usize::from(profiles.categories[i]);
+    let categories = counted.iter().map(|&i| category(i) + 1).max().unwrap_or(1);
+    let mut groups = vec![Vec::new(); categories];
+    counted.iter().for_each(|&i| groups[category(i)].push(i));
+    groups
+}
+
+/// All profiles with the joint kernel of the types.
+fn unfold_together(
+    fitting: &Fitting<'_>,
+    counted: &[usize],
+    progress: Progress<'_>,
+) -> Result<Unfolding, DensityError> {
+    let (counts, kernel) = fitting.part(counted, None)?;
+    let mut all = unfold_with_progress(&counts, &kernel, &fitting.unfold, progress)?;
+    all.findings = fitting.cured(&all.findings, counted, None);
+    if let Some(edges) = fitting.histogram_edges() {
+        all.rebin_profiles(&edges);
+    }
+    Ok(all)
+}
+
+/// Each type with its own kernel.
+fn unfold_types(
+    fitting: &Fitting<'_>,
+    counted: &[usize],
+    progress: Progress<'_>,
+) -> Result<TypesUnfolding, DensityError> {
+    let types = fitting.types.types();
+    let of_type = |kind: usize| Group {
+        places: fitting.of_type(counted, kind),
+        kind: Some(kind),
+    };
+    let groups: Vec<Group> = (0..types.len()).map(of_type).collect();
+    if let Some(index) = groups.iter().position(|group| group.places.is_empty()) {
+        return Err(DensityError::EmptyType {
+            index,
+            name: types[index].name.clone(),
+        });
+    }
+    unfold_groups(fitting, &groups, &fitting.unfold, progress)
+}
+
+/// Profiles that are unfolded separately.
+struct Group {
+    places: Vec<usize>,
+    /// The type of their particles; `None`: all types in their fractions.
+    kind: Option<usize>,
+}
+
+/// The categories, and within each the types if `labelled`, that have a profile above the threshold.
+fn category_groups(fitting: &Fitting<'_>, by_colour: &[Vec<usize>], labelled: bool) -> Vec<(u8, Group)> {
+    let kinds: Vec<Option<usize>> = if labelled {
+        (0..fitting.types.types().len()).map(Some).collect()
+    } else {
+        vec![None]
+    };
+    let mut groups = Vec::new();
+    for (category, places) in (0..=u8::MAX).zip(by_colour) {
+        for &kind in &kinds {
+            let places = kind.map_or_else(|| places.clone(), |kind| fitting.of_type(places, kind));
+            if fitting.observed(&places) {
+                groups.push((category, Group { places, kind }));
+            }
+        }
+    }
+    groups
+}
+
+/// Unfolds the categories; `None` if none has a profile above the threshold.
+fn unfold_categories(
+    fitting: &Fitting<'_>,
+    groups: Vec<(u8, Group)>,
+    options: &UnfoldOptions,
+    progress: Progress<'_>,
+) -> Result<Option<CategoryDensities>, DensityError> {
+    let (categories, groups): (Vec<u8>, Vec<Group>) = groups.into_iter().unzip();
+    if categories.is_empty() {
+        return Ok(None);
+    }
+    let found = unfold_groups(fitting, &groups, options, progress)?;
+    Ok(Some(CategoryDensities {
+        categories,
+        kinds: groups.iter().map(|group| group.kind).collect(),
+        found,
+    }))
+}
+
+fn unfold_groups(
+    fitting: &Fitting<'_>,
+    groups: &[Group],
+    options: &UnfoldOptions,
+    progress: Progress<'_>,
+) -> Result<TypesUnfolding, DensityError> {
+    let parts = groups
+        .iter()
+        .map(|group| fitting.part(&group.places, group.kind))
+        .collect::<Result<Vec<_>, DensityError>>()?;
+    let mut found = unfold_types_with_progress(&parts, options, progress)?;
+    for (part, group) in found.types.iter_mut().zip(groups) {
+        part.findings = fitting.cured(&part.findings, &group.places, group.kind);
+    }
+    if let Some(edges) = fitting.histogram_edges() {
+        found.rebin_profiles(&edges);
+    }
+    Ok(found)
+}
+
+/// Separate densities of every category, zero for those with no profile above the threshold.
+fn summed_by_category(separate: &CategoryDensities, all: &Unfolding, categories: usize) -> Vec<Vec<Option<f64>>> {
+    let none: Vec<Option<f64>> = all.number_density.iter().map(|density| density.map(|_| 0.0)).collect();
+    let mut sums = vec![none; categories];
+    for (&category, part) in separate.categories.iter().zip(&separate.found.types) {
+        for (sum, density) in sums[usize::from(category)].iter_mut().zip(&part.number_density) {
+            *sum = match (*sum, *density) {
+                (Some(sum), Some(density)) => Some(sum + density),
+                (sum, density) => sum.or(density),
+            };
+        }
+    }
+    sums
+}
+
+/// The density of all, in proportion to the profiles of every category.
+fn fractions_by_category(
+    profiles: &MeasuredProfiles,
+    all: &Unfolding,
+    by_colour: &[Vec<usize>],
+) -> Vec<Vec<Option<f64>>> {
+    let weight_of = |places: &[usize]| places.iter().map(|&i| profiles.weights[i]).sum::<f64>();
+    let whole: f64 = profiles.weights.iter().filter(|weight| **weight > 0.0).sum();
+    let of_category = |places: &Vec<usize>| {
+        let fraction = weight_of(places) / whole;
+        let densities = all.number_density.iter();
+        densities.map(|density| density.map(|n| n * fraction)).collect()
+    };
+    by_colour.iter().map(of_category).collect()
+}
+
+fn findings(
+    all: &Unfolding,
+    by_type: &[Unfolding],
+    counted: usize,
+    settled: &Settled,
+    options: &DensityOptions,
+) -> Vec<Finding> {
+    let mut findings = all.findings.clone();
+    for (kind, part) in by_type.iter().enumerate() {
+        let of_type = |finding: &Finding| Finding::new(finding.code, format!("type {kind}: {}", finding.message));
+        findings.extend(part.findings.iter().map(of_type));
+    }
+    if let Some(requested) = settled.reduced_from {
+        findings.push(Finding::new(
+            "fewer-bins",
+            format!("{counted} profiles are too few for {requested} bins: {counted} equal bins were used"),
+        ));
+    }
+    let uncorrected = |largest: &crate::pipeline::LargestParticle| largest.method != options.max_size;
+    if settled.largest.as_ref().is_some_and(uncorrected) && options.max_size == LargestSize::Corrected {
+        findings.push(Finding::new(
+            "largest-uncorrected",
+            "the largest profiles are all of one size, so the largest size could not be extrapolated: the size of the largest profile was used",
+        ));
+    }
+    findings
 }

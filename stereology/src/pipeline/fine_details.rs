@@ -1,8 +1,8 @@
 //! The residual of the photograph, synthesised again in three dimensions: section 4.3.
 
-use crate::pipeline::Warning;
 use ndarray::{Array2, Array4, Axis};
 use std::ops::ControlFlow;
+use stereology_metrics::Finding;
 use stereology_pyramid::{Exemplar, TextureError, TextureOptions, TextureReport, synthesize_volume_with_report};
 use stereology_segment::Segmentation;
 use stereology_volume::Residual;
@@ -17,7 +17,7 @@ pub struct FineDetails {
     /// Report on the particles'; `None` if they are too small to tell.
     pub particles: Option<TextureReport>,
     /// What to know.
-    pub warnings: Vec<Warning>,
+    pub findings: Vec<Finding>,
 }
 
 /// Synthesises tileable residual volumes of `voxels`³ at the photograph's pixel scale, one from the pixels of the binder, one from those of all particles.
@@ -78,19 +78,19 @@ pub fn fine_details(
     };
     let binder_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] == 0 && inner[p] && no_fines[p]);
     let particle_mask = Array2::from_shape_fn(labels.dim(), |p| labels[p] > 0 && inner[p]);
-    let mut warnings = Vec::new();
+    let mut findings = Vec::new();
     let mut part = |mask: &Array2<bool>, of: &str, from: f64, seed: u64| {
         let exemplar = Exemplar::new(residual.view()).with_mask(mask.view());
         let half = |done: f64, _: &TextureReport| progress(from + 0.5 * done);
         match synthesize_volume_with_report(&exemplar, [voxels; 3], &options.clone().with_seed(seed), &half) {
             Ok((volume, report)) => {
                 for finding in &report.findings {
-                    warnings.push(Warning::new(finding.code, format!("{of}: {}", finding.message)));
+                    findings.push(Finding::new(finding.code, format!("{of}: {}", finding.message)));
                 }
                 Ok((volume, Some(report)))
             }
             Err(TextureError::MaskTooSmall { .. }) => {
-                warnings.push(Warning::new("no-texture", format!("the photograph shows too few pixels inside the {of} to learn its texture from; it was left plain")));
+                findings.push(Finding::new("no-texture", format!("the photograph shows too few pixels inside the {of} to learn its texture from; it was left plain")));
                 Ok((Array4::zeros([voxels, voxels, voxels, 3]), None))
             }
             Err(error) => Err(error),
@@ -107,7 +107,7 @@ pub fn fine_details(
         },
         binder: binder_report,
         particles: particle_report,
-        warnings,
+        findings,
     })
 }
 

@@ -1,26 +1,47 @@
-//! What all fits of one table of profiles share: size bins, threshold, capping angle; counts and kernels of any part of the profiles.
+//! What all fits of one table of profiles have in common: size bins, threshold, capping angle, fractions of the types; counts and kernels of any part of the
+//! profiles.
 
-use crate::pipeline::densities::reported;
+use std::borrow::Cow;
+
+use crate::pipeline::section_model::reported;
 use crate::pipeline::{
-    DensityError, DensityOptions, MeasuredProfiles, ParticleTypes, UnfoldingBins, capping_angle, largest_particle,
-    size_edges,
+    DensityError, DensityOptions, LargestParticle, MeasuredProfiles, ParticleTypes, Spacing, TypeFractions,
+    UnfoldingBins, capping_angle, largest_particle, size_edges, type_fractions,
 };
 use stereology_kmatrix::Sizes;
+use stereology_metrics::Finding;
 use stereology_unfold::{
-    Finding, Kernel, Method, ProfileCounts, UnfoldOptions, divided_edges, equal_edges, unfold, with_cure,
+    Fractions, Kernel, LikelyParameter, Method, ProfileCounts, UnfoldOptions, divided_edges, equal_edges, unfold,
+    with_cure,
 };
 
 /// Fits of one table of profiles.
 pub(crate) struct Fitting<'a> {
     profiles: &'a MeasuredProfiles,
-    types: &'a ParticleTypes,
+    /// The particle types with the fractions of the fit.
+    pub(crate) types: Cow<'a, ParticleTypes>,
     sizes: Sizes,
     edges: Vec<f64>,
     threshold: f64,
     angle: f64,
     bins: UnfoldingBins,
-    /// The estimator, with the threshold that is used.
+    /// The estimator, with the threshold of the fit.
     pub(crate) unfold: UnfoldOptions,
+    /// What was chosen or estimated before the fit.
+    pub(crate) settled: Settled,
+}
+
+/// What was chosen or estimated from the profiles before the densities were fitted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settled {
+    /// The largest particle size; `None` if the edges of the bins were given.
+    pub largest: Option<LargestParticle>,
+    /// The search for the capping angle (radians), if there was one.
+    pub capping: Option<LikelyParameter>,
+    /// The estimated fractions of the particle types, if they were unknown.
+    pub fractions: Option<Fractions>,
+    /// The requested number of bins, if it was reduced to the number of counted profiles.
+    pub reduced_from: Option<usize>,
 }
 
 impl<'a> Fitting<'a> {
@@ -29,22 +50,35 @@ impl<'a> Fitting<'a> {
         types: &'a ParticleTypes,
         options: &DensityOptions,
     ) -> Result<Self, DensityError> {
-        if profiles.weights.iter().all(|weight| *weight <= 0.0) {
-            return Err(DensityError::NoProfiles(profiles.sizes.len()));
-        }
-        let edges = match &options.edges {
-            Some(edges) => edges.clone(),
-            None => {
-                let (largest, _) = largest_particle(profiles, types, options.max_size, &options.unfold)?;
-                size_edges(profiles, largest, options)?
+        let counted = profiles.counted()?.len();
+        let mut settled = Settled::default();
+        let limit = options.unfold.min_size.unwrap_or(profiles.min_size);
+        let edges = if let Some(edges) = &options.edges {
+            edges.clone()
+        } else {
+            let observed = with_threshold(&options.unfold, limit);
+            let largest = largest_particle(profiles, types, options.max_size, &observed)?;
+            let size = largest.size;
+            settled.largest = Some(largest);
+            let edges = size_edges(profiles, size, options)?;
+            let bins = edges.len() - 1;
+            if options.spacing == Spacing::Equal && bins > counted {
+                settled.reduced_from = Some(bins);
+                equal_edges(edges[bins], counted)
+            } else {
+                edges
             }
         };
-        let threshold = settled_threshold(&edges, options.unfold.min_size.unwrap_or(profiles.min_size));
-        let unfold = UnfoldOptions {
-            min_size: (threshold > 0.0).then_some(threshold),
-            ..options.unfold
-        };
-        let (angle, _) = capping_angle(profiles, types, options.capping, &edges, &unfold)?;
+        let threshold = settled_threshold(&edges, limit);
+        let unfold = with_threshold(&options.unfold, threshold);
+        let (angle, capping) = capping_angle(profiles, types, options.capping, &edges, &unfold)?;
+        settled.capping = capping;
+        let mut types = Cow::Borrowed(types);
+        if options.fractions == TypeFractions::Likelihood {
+            let found = type_fractions(profiles, &types, &edges, &unfold)?;
+            types = Cow::Owned(types.into_owned().with_shares(&found.fractions)?);
+            settled.fractions = Some(found);
+        }
         Ok(Self {
             bins: types.unfolding_bins(&edges, threshold, unfold.method, options.sizes),
             profiles,
@@ -54,22 +88,28 @@ impl<'a> Fitting<'a> {
             threshold,
             angle,
             unfold,
+            settled,
         })
     }
 
-    /// Profiles that count.
-    pub(crate) fn counted(&self) -> Vec<usize> {
-        (0..self.profiles.sizes.len())
-            .filter(|&i| self.profiles.weights[i] > 0.0)
-            .collect()
-    }
-
-    /// Counts of the profiles at `places`, and the kernel of a type, or of all in their shares.
+    /// Counts of the profiles at `places`, and the kernel of one type, or of all types in their fractions.
     pub(crate) fn part(&self, places: &[usize], of: Option<usize>) -> Result<(ProfileCounts, Kernel), DensityError> {
         Ok((
             self.counts(places, &self.bins)?,
             self.kernel(of, &self.bins, &self.edges)?,
         ))
+    }
+
+    /// Those of the profiles at `places` that are of a type.
+    pub(crate) fn of_type(&self, places: &[usize], kind: usize) -> Vec<usize> {
+        let of_type = |i: &usize| self.profiles.types[*i] == kind;
+        places.iter().copied().filter(of_type).collect()
+    }
+
+    /// Whether any of the profiles at `places` is above the threshold.
+    pub(crate) fn observed(&self, places: &[usize]) -> bool {
+        let threshold = self.unfold.min_size.unwrap_or(0.0);
+        places.iter().any(|&i| self.profiles.sizes[i] > threshold)
     }
 
     fn counts(&self, places: &[usize], bins: &UnfoldingBins) -> Result<ProfileCounts, DensityError> {
@@ -86,7 +126,7 @@ impl<'a> Fitting<'a> {
         }
         let slices: Vec<usize> = places.iter().map(|&i| of.slices[i]).collect();
         let counts = ProfileCounts::from_slices(&sizes, Some(&weights), &slices, &bins.profile_edges, of.area)?;
-        // A part may have nothing on the last slices; they are slices all the same.
+        // A part may have no profiles on the last slices, which count nevertheless.
         Ok(counts.with_slices(of.slices.iter().max().map_or(0, |last| last + 1)))
     }
 
@@ -98,7 +138,7 @@ impl<'a> Fitting<'a> {
         reported(kernel, edges)
     }
 
-    /// What [`part`](Self::part)'s findings would be in fewer equal bins.
+    /// Findings of [`part`](Self::part) in fewer equal bins.
     fn in_fewer(&self, bins: usize, places: &[usize], of: Option<usize>) -> Vec<Finding> {
         let edges = equal_edges(self.edges[self.edges.len() - 1], bins);
         let bins = self
@@ -115,7 +155,7 @@ impl<'a> Fitting<'a> {
         found().unwrap_or_default()
     }
 
-    /// Findings of [`part`](Self::part) that name the number of bins that cures them.
+    /// Findings of [`part`](Self::part) with the number of bins that avoids them.
     pub(crate) fn cured(&self, findings: &[Finding], places: &[usize], of: Option<usize>) -> Vec<Finding> {
         let in_fewer = |bins: usize| self.in_fewer(bins, places, of);
         let bins = self.edges.len() - 1;
@@ -125,26 +165,36 @@ impl<'a> Fitting<'a> {
             .collect()
     }
 
-    /// Edges for histograms of profiles: the reported bins cut in halves, with an edge at the threshold, as fine as a histogram of some hundred profiles can
-    /// be. `None` where the fit has no finer ones.
+    /// Edges for histograms of profiles: the reported bins in halves, with an edge at the threshold; finer bins would be too noisy with some hundred
+    /// profiles. `None` where the fit has no finer bins.
     pub(crate) fn histogram_edges(&self) -> Option<Vec<f64>> {
         let finer = self.unfold.method != Method::Paper;
         finer.then(|| divided_edges(&self.edges, 2 * (self.edges.len() - 1), self.threshold))
     }
 }
 
-/// The threshold, raised to the upper edge of its bin if that edge is less than [`SEEN`] times the threshold: a plane that cuts a sphere of diameter D shows it
-/// above t with probability √(1 − (t / D)²), and where that is small hardly any profile tells of such particles and their density would be anything.
+/// The options with this threshold (0: none).
+fn with_threshold(options: &UnfoldOptions, threshold: f64) -> UnfoldOptions {
+    UnfoldOptions {
+        min_size: (threshold > 0.0).then_some(threshold),
+        ..*options
+    }
+}
+
+/// The threshold, raised to the upper edge of its bin if that edge is less than [`OBSERVED`] times the threshold.
+///
+/// A section of a sphere of diameter D is larger than t with probability √(1 − (t / D)²). Where that is small, few profiles constrain the density, which is
+/// then ill-determined.
 fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
     let bin = size_edges
         .windows(2)
         .find(|bin| bin[0] < threshold && threshold < bin[1]);
     match bin {
-        // Above the last edge there is nothing.
-        Some(bin) if bin[1] < SEEN * threshold && Some(&bin[1]) != size_edges.last() => bin[1],
+        // Above the last edge there are no particles.
+        Some(bin) if bin[1] < OBSERVED * threshold && Some(&bin[1]) != size_edges.last() => bin[1],
         _ => threshold,
     }
 }
 
-/// At this many thresholds three quarters of a sphere's profiles are seen.
-const SEEN: f64 = 1.5;
+/// At 1.5 times the threshold three quarters of a sphere's profiles are observed.
+const OBSERVED: f64 = 1.5;

@@ -1,36 +1,41 @@
-//! The chain from a photograph to its solid: what composes the rooms.
+//! The chain from a photograph to its solid, which combines the other crates.
 //!
-//! [`synthesize`] is the whole chain; its steps can be called alone: [`measured_profiles`], [`particle_densities`], [`population`], [`fine_details`], [`verify`], [`residual_spectra`].
+//! [`synthesize`] runs the whole chain. Its steps can be called separately: [`measured_profiles`], [`unfold_profiles`], [`population`], [`fine_details`],
+//! [`verify`], [`residual_spectra`]. [`Verdict`] judges the result.
 
 mod association;
 mod colouring;
 mod densities;
+mod density_options;
 mod fine_details;
 mod fitting;
-mod groups;
+mod measured_profiles;
 mod particle_types;
 mod population;
 mod residual_spectra;
 mod section_model;
 mod size_classes;
 mod synthesis;
+mod unfolding_bins;
+mod verdict;
 mod verification;
-mod warning;
 mod wasserstein;
 
 pub use association::{Association, SIGNIFICANT, association};
 pub use colouring::particle_colours;
-pub use densities::{
-    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, UnfoldingBins, particle_densities,
-};
+pub use densities::{CategoryDensities, ParticleDensities, unfold_profiles};
+pub use density_options::{Capping, DensityOptions, LargestSize, SeparateCategories, Spacing, TypeFractions};
 pub use fine_details::{FineDetails, fine_details};
-pub use groups::{CategoryDensities, category_densities, type_densities};
+pub use fitting::Settled;
+pub use measured_profiles::{DensityError, MeasuredProfiles};
 pub use particle_types::{ParticleType, ParticleTypes, ParticleTypesError};
 pub use population::{Extent, Population, PopulationFailure, population};
 pub use residual_spectra::{ResidualSpectra, SpectraError, residual_spectra};
-pub use section_model::{Capping, LargestSize, capping_angle, largest_particle, type_shares};
-pub use size_classes::{Spacing, size_edges};
+pub use section_model::{LargestParticle, capping_angle, largest_particle, type_fractions};
+pub use size_classes::size_edges;
+pub use stereology_metrics::{Finding, Progress};
 pub use synthesis::{Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize};
+pub use unfolding_bins::UnfoldingBins;
+pub use verdict::{Check, CheckName, Evidence, Level, Opinion, Verdict};
 pub use verification::{Comparison, Recipe, Verification, VerificationError, verify};
-pub use warning::Warning;
 pub use wasserstein::wasserstein;

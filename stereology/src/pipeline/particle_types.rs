@@ -1,4 +1,4 @@
-//! The types of particle a material is made of: their bodies, their shares, and the kernel they have together.
+//! The particle types of a material: their bodies, their shares, and their joint kernel.
 
 use stereology_kmatrix::{EdgesError, SectionLaw, SectionOptions, Sizes};
 use stereology_shape::{Body, BodyError, UnitBody};
@@ -7,7 +7,7 @@ use stereology_unfold::{Kernel, KernelError, SizeBins};
 /// One type of particle.
 #[derive(Clone, Debug)]
 pub struct ParticleType {
-    /// What describes it: `sphere`, `rock:1`, a mesh file.
+    /// Its specification: `sphere`, `rock:1`, a mesh file.
     pub name: String,
     /// Its body.
     pub body: Body,
@@ -17,27 +17,27 @@ pub struct ParticleType {
 }
 
 impl ParticleType {
-    /// How often a random plane shows this body at each size.
+    /// Distribution of the profile sizes of this body on random planes.
     #[must_use]
     pub fn law(&self) -> &SectionLaw {
         &self.law
     }
 }
 
-/// The types of particle of a material, sharing one size distribution: section 3.3.
+/// The particle types of a material, with one common size distribution: section 3.3.
 #[derive(Clone, Debug)]
 pub struct ParticleTypes {
     types: Vec<ParticleType>,
 }
 
-/// Types of particle that cannot be.
+/// Why particle types cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParticleTypesError {
-    /// A body cannot be made.
+    /// An invalid body.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A section law cannot be computed.
+    /// A section law that cannot be computed.
     #[error("{name}: {why}")]
     Law {
         /// Which shape.
@@ -45,13 +45,21 @@ pub enum ParticleTypesError {
         /// Why.
         why: String,
     },
-    /// A share that is none.
-    #[error("{name}: the share of a shape is a positive number, not {share}")]
+    /// A share that is not a positive number.
+    #[error("{name}: the share of a shape must be a positive number, not {share}")]
     Share {
         /// Which shape.
         name: String,
-        /// What was given.
+        /// The given share.
         share: f64,
+    },
+    /// Another number of shares than of types.
+    #[error("{shares} shares for {types} shapes: give one share per shape")]
+    Shares {
+        /// Number of shares.
+        shares: usize,
+        /// Number of types.
+        types: usize,
     },
     /// There are no types.
     #[error("no shape is given: name one, for instance sphere")]
@@ -59,22 +67,22 @@ pub enum ParticleTypesError {
     /// The bins of a kernel.
     #[error(transparent)]
     Edges(#[from] EdgesError),
-    /// The kernel of the types together.
+    /// The joint kernel.
     #[error(transparent)]
     Kernel(#[from] KernelError),
 }
 
-/// Largest standard error of a kernel's entries, relative to a column sum of 1: well below what some hundred profiles can tell.
+/// Largest standard error of a kernel's entries, relative to a column sum of 1: well below the counting error of some hundred profiles.
 const LAW_TOLERANCE: f64 = 2e-3;
 
 impl ParticleTypes {
-    /// Types from their bodies, names and shares; shares are scaled to sum to 1.
+    /// Types from names, bodies and shares; the shares are scaled to sum to 1.
     ///
-    /// Computes each body's section law: closed for spheres and ellipsoids, up to some seconds for a mesh of many triangles.
+    /// Computes the section law of each body: closed form for spheres and ellipsoids, up to some seconds for a mesh of many triangles.
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError`] for no types, a share that is not positive, a body whose law cannot be computed.
+    /// [`ParticleTypesError`]: no type, a share that is not positive, a body whose section law cannot be computed.
     pub fn new(bodies: Vec<(String, Body, f64)>) -> Result<Self, ParticleTypesError> {
         if bodies.is_empty() {
             return Err(ParticleTypesError::None);
@@ -101,19 +109,29 @@ impl ParticleTypes {
         Ok(Self { types })
     }
 
-    /// The same types in other shares, scaled to sum to 1; shares beyond the types are ignored.
+    /// The same types with other shares, one per type, scaled to sum to 1.
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError::Share`] for a share that is negative or not finite, or if all are zero.
+    /// [`ParticleTypesError::Shares`] unless there is one share per type; [`ParticleTypesError::Share`] for a share that is negative or not finite, or if
+    /// all are zero.
     ///
     /// ```
-    /// let types = stereology::pipeline::ParticleTypes::parse(&["sphere", "box:1,1,2"])?.with_shares(&[3.0, 1.0])?;
-    /// assert_eq!(types.types()[1].share, 0.25);
+    /// use stereology::pipeline::ParticleTypes;
+    ///
+    /// let types = ParticleTypes::parse(&["sphere", "box:1,1,2"])?;
+    /// assert_eq!(types.clone().with_shares(&[3.0, 1.0])?.types()[1].share, 0.25);
+    /// assert!(types.with_shares(&[1.0]).is_err());
     /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
     /// ```
     pub fn with_shares(mut self, shares: &[f64]) -> Result<Self, ParticleTypesError> {
-        let whole: f64 = shares.iter().take(self.types.len()).sum();
+        if shares.len() != self.types.len() {
+            return Err(ParticleTypesError::Shares {
+                shares: shares.len(),
+                types: self.types.len(),
+            });
+        }
+        let whole: f64 = shares.iter().sum();
         for (of, &share) in self.types.iter_mut().zip(shares) {
             if !(share.is_finite() && share >= 0.0 && whole > 0.0) {
                 return Err(ParticleTypesError::Share {
@@ -126,7 +144,7 @@ impl ParticleTypes {
         Ok(self)
     }
 
-    /// One of the types, as if there were no other.
+    /// One of the types alone, with a share of 1.
     pub(crate) fn only(&self, index: usize) -> Self {
         let types = self.types[index..=index].iter().map(|of| ParticleType {
             share: 1.0,
@@ -135,7 +153,7 @@ impl ParticleTypes {
         Self { types: types.collect() }
     }
 
-    /// Types from words, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file.
+    /// Types from their specifications, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file.
     ///
     /// # Errors
     ///
@@ -154,23 +172,23 @@ impl ParticleTypes {
         Self::new(bodies)
     }
 
-    /// The types, shares summing to 1.
+    /// The types; their shares sum to 1.
     #[must_use]
     pub fn types(&self) -> &[ParticleType] {
         &self.types
     }
 
-    /// The bodies at size 1 about their centroids, one a type.
+    /// The body of each type, centred at its centroid and scaled to size 1.
     #[must_use]
     pub fn unit_bodies(&self) -> Vec<UnitBody> {
         self.types.iter().map(|of| UnitBody::new(&of.body)).collect()
     }
 
-    /// The kernel of the types together, Σ P(i) H_i K_i, in units of length: eqs. (10)-(12). With one type it is H K of eq. (5).
+    /// Joint kernel of the types, Σ P(i) H_i K_i, in units of length: eqs. (10)-(12). For one type it is H K of eq. (5).
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError::Edges`] for edges that make no bins.
+    /// [`ParticleTypesError::Edges`] for edges that do not form bins.
     ///
     /// # Examples
     ///
@@ -206,7 +224,7 @@ impl ParticleType {
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError::Edges`] for edges that make no bins.
+    /// [`ParticleTypesError::Edges`] for edges that do not form bins.
     ///
     /// # Examples
     ///
@@ -240,7 +258,7 @@ impl ParticleType {
     }
 }
 
-/// Closed for spheres and ellipsoids; for meshes sections are integrated until the kernel is known to [`LAW_TOLERANCE`].
+/// Closed form for spheres and ellipsoids; for meshes sections are integrated until the error of the kernel is below [`LAW_TOLERANCE`].
 fn section_law(name: &str, body: &Body) -> Result<SectionLaw, ParticleTypesError> {
     SectionLaw::of_body(body, &SectionOptions::default().with_tolerance(LAW_TOLERANCE)).map_err(|error| {
         ParticleTypesError::Law {

@@ -1,9 +1,10 @@
 //! How large the box that repeats is, and which particles go into it.
 
-use crate::pipeline::{ParticleDensities, ParticleTypes, Warning};
+use crate::pipeline::{ParticleDensities, ParticleTypes};
 use nalgebra::Vector3;
 use stereology_anneal::{Grain, PopulationError, SizeDensities, SizeInBin, grains_from_densities, scale_to_fraction};
 use stereology_kmatrix::Sizes;
+use stereology_metrics::Finding;
 use stereology_shape::{BoxError, PeriodicBox};
 
 /// How large the solid is.
@@ -32,7 +33,7 @@ pub struct Population {
     /// Densities were multiplied by this to meet the photograph's area fraction (Delesse: V_V = A_A).
     pub density_factor: f64,
     /// What was rounded or left out.
-    pub warnings: Vec<Warning>,
+    pub findings: Vec<Finding>,
 }
 
 /// A population that cannot be.
@@ -78,14 +79,14 @@ const FRACTION_TOLERANCE: f64 = 0.1;
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
+/// use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, unfold_profiles, population};
 ///
 /// // Cuts through spheres of diameter 10, at evenly spread depths, on an area of 1e5: they fill 300 / 1e5 / 10 * pi 10³ / 6 = .157.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let spheres = ParticleTypes::parse(&["sphere"])?;
 /// let options = DensityOptions { bins: 5, ..DensityOptions::default() };
-/// let densities = particle_densities(&profiles, &spheres, &options, &|_| ControlFlow::Continue(()))?;
+/// let densities = unfold_profiles(&profiles, &spheres, &options, &|_| ControlFlow::Continue(()))?;
 /// let drawn = population(&densities, &spheres, 0.157, Extent::Count(1000), 8.0, 0)?;
 /// let volume: f64 = drawn.grains.iter().map(|grain| grain.size.powi(3) * std::f64::consts::PI / 6.0).sum();
 /// assert!((volume / drawn.period.volume() - 0.157).abs() < 1e-9);
@@ -113,9 +114,9 @@ pub fn population(
         return Err(PopulationFailure::Nothing);
     }
     let density_factor = fraction / unfolded_fraction;
-    let mut warnings = Vec::new();
+    let mut findings = Vec::new();
     if (density_factor - 1.0).abs() > FRACTION_TOLERANCE {
-        warnings.push(Warning::new(
+        findings.push(Finding::new(
             "fraction-mismatch",
             format!(
                 "the unfolded particles fill {unfolded_fraction:.3} of the volume, the photograph's profiles cover {fraction:.3} of its area: densities were \
@@ -129,9 +130,9 @@ pub fn population(
         .filter(|bin| bin.number_density > 0.0)
         .map(|bin| bin.upper)
         .fold(0.0, f64::max);
-    let side = side(extent, largest, per_volume, texture_period, &mut warnings)?;
+    let side = side(extent, largest, per_volume, texture_period, &mut findings)?;
     let period = PeriodicBox::new(Vector3::repeat(side))?;
-    let kept = keep_largest(bins, density_factor, period.volume(), &mut warnings);
+    let kept = keep_largest(bins, density_factor, period.volume(), &mut findings);
     let mut grains = draw(&kept, densities, types, density_factor, period.volume(), seed)?;
     if grains.is_empty() {
         return Err(PopulationFailure::Nothing);
@@ -147,7 +148,7 @@ pub fn population(
         fraction,
         unfolded_fraction,
         density_factor,
-        warnings,
+        findings,
     })
 }
 
@@ -199,7 +200,7 @@ fn side(
     largest: f64,
     per_volume: f64,
     texture_period: f64,
-    warnings: &mut Vec<Warning>,
+    findings: &mut Vec<Finding>,
 ) -> Result<f64, PopulationFailure> {
     let holding = |count: f64| (count / per_volume).cbrt();
     let asked = match extent {
@@ -226,7 +227,7 @@ fn side(
         return Err(PopulationFailure::Side { side, why });
     }
     if extent != Extent::Auto && (side / asked - 1.0).abs() > 0.02 {
-        warnings.push(Warning::new(
+        findings.push(Finding::new(
             "box-rounded",
             format!("the box's side was rounded from {asked:.4} to {side:.4}, {periods} periods of the texture, so that the solid repeats"),
         ));
@@ -235,7 +236,7 @@ fn side(
 }
 
 /// The largest particles up to the most that are packed.
-fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, warnings: &mut Vec<Warning>) -> Vec<Bin> {
+fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, findings: &mut Vec<Finding>) -> Vec<Bin> {
     let per_count = density_factor * volume;
     let expected: f64 = bins.iter().map(|bin| bin.number_density * per_count).sum();
     if expected <= MOST_PARTICLES {
@@ -267,7 +268,7 @@ fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, warnings: &mut
     }
     kept.reverse();
     let lost = 1.0 - kept.iter().map(Bin::volume).sum::<f64>() / bins.iter().map(Bin::volume).sum::<f64>();
-    warnings.push(Warning::new(
+    findings.push(Finding::new(
         "fines-left-out",
         format!(
             "the box would hold {expected:.0} particles; those below size {smallest:.4} ({:.1} % of the particles' volume) were left out. Take a smaller --box to keep them",

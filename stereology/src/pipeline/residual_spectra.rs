@@ -19,6 +19,40 @@ pub struct ResidualSpectra {
     pub sections: Vec<f64>,
 }
 
+impl ResidualSpectra {
+    /// Root mean square of log10 of the ratio of the powers, each frequency weighted by its part of the photograph's variance: 0.3 is a factor of two.
+    #[must_use]
+    pub fn log_error(&self) -> f64 {
+        let mut sums = [0.0; 2];
+        for (frequency, photo, ratio) in self.ratios() {
+            // The number of frequencies on a ring is proportional to its radius.
+            let weight = frequency * photo;
+            sums[0] += weight * ratio.log10().powi(2);
+            sums[1] += weight;
+        }
+        (sums[0] / sums[1]).sqrt()
+    }
+
+    /// The frequency at which the powers differ most, and the power in sections over that in the photograph there.
+    #[must_use]
+    pub fn worst(&self) -> Option<(f64, f64)> {
+        let by_distance = |ratio: &f64| ratio.log10().abs();
+        self.ratios()
+            .map(|(frequency, _, ratio)| (frequency, ratio))
+            .max_by(|a, b| by_distance(&a.1).total_cmp(&by_distance(&b.1)))
+    }
+
+    /// Frequency, power in the photograph, and power in sections over it, where both are positive.
+    fn ratios(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let powers = self.photo.iter().zip(&self.sections);
+        self.frequency
+            .iter()
+            .zip(powers)
+            .filter(|(_, (photo, sections))| **photo > 0.0 && **sections > 0.0)
+            .map(|(&frequency, (&photo, &sections))| (frequency, photo, sections / photo))
+    }
+}
+
 /// Spectra that cannot be had.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -1,64 +1,34 @@
-//! What must be known before densities can be: the largest size, what is lost at the rims, the shares of the types; each given, or found from the profiles.
+//! Parameters of the kernel: the largest size, the capping angle, the fractions of the particle types; each given, or estimated from the profiles.
 
-use crate::pipeline::densities::reported;
-use crate::pipeline::{DensityError, MeasuredProfiles, ParticleTypes, UnfoldingBins};
+use crate::pipeline::{Capping, DensityError, LargestSize, MeasuredProfiles, ParticleTypes, UnfoldingBins};
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
-    Fractions, Kernel, LikelyParameter, ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, equal_edges,
-    largest_size, likely_parameter, unknown_fractions,
+    Fractions, Kernel, LikelyParameter, ProfileCounts, SizeBins, UnfoldError, UnfoldOptions, capped_kernel,
+    equal_edges, largest_size, likely_parameter, unknown_fractions,
 };
 
-/// The largest size of a particle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum LargestSize {
-    /// That of the largest profile, eq. (7): a cut through the middle of the largest particle. Too small, by half a percent with a thousand profiles.
-    #[default]
-    Profile,
-    /// The largest profile and what it falls short of, from the spacing of the largest ones.
-    Corrected,
-    /// Of highest likelihood, between the largest profile and half as much again.
-    Likelihood,
-    /// Known.
-    Given(f64),
-}
-
-/// Profiles that are lost at the rims of particles, where the plane only just cuts them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Capping {
-    /// None.
-    #[default]
-    None,
-    /// Those below D sin φ of a particle of size D; φ in radians.
-    Angle(f64),
-    /// The same with φ of highest likelihood, between 0 and 80°.
-    Likelihood,
-}
-
-/// Nominal coverage of the intervals of what is found by likelihood.
+/// Nominal coverage of the intervals of parameters of highest likelihood.
 const LEVEL: f64 = 0.9;
-/// The largest capping angle that is looked for, in radians: a profile as wide as all but 1.5 % of the particle.
+/// Upper end of the search for the capping angle, in radians: at this angle profiles narrower than 98.5 % of the particle are lost.
 const STEEPEST: f64 = 1.4;
-/// Sizes beyond this many largest profiles are not looked for.
+/// Upper end of the search for the largest size, in sizes of the largest profile.
 const BEYOND: f64 = 1.5;
 
-/// The counted profiles: sizes and weights.
+/// Sizes and weights of the counted profiles.
 struct Counted {
     sizes: Vec<f64>,
     weights: Vec<f64>,
 }
 
-fn counted(profiles: &MeasuredProfiles) -> Result<Counted, DensityError> {
-    let places = || (0..profiles.sizes.len()).filter(|&i| profiles.weights[i] > 0.0);
-    if places().next().is_none() {
-        return Err(DensityError::NoProfiles(profiles.sizes.len()));
-    }
-    Ok(Counted {
-        sizes: places().map(|i| profiles.sizes[i]).collect(),
-        weights: places().map(|i| profiles.weights[i]).collect(),
-    })
-}
-
 impl Counted {
+    fn of(profiles: &MeasuredProfiles) -> Result<Self, DensityError> {
+        let places = profiles.counted()?;
+        Ok(Self {
+            sizes: places.iter().map(|&i| profiles.sizes[i]).collect(),
+            weights: places.iter().map(|&i| profiles.weights[i]).collect(),
+        })
+    }
+
     fn largest(&self) -> f64 {
         self.sizes.iter().copied().fold(0.0, f64::max)
     }
@@ -73,35 +43,59 @@ impl Counted {
     }
 }
 
-/// The largest size, and if it is sought by likelihood the search.
+/// The largest particle size of a fit, and how it was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LargestParticle {
+    /// The size.
+    pub size: f64,
+    /// How it was found. It differs from the request in one case: [`LargestSize::Corrected`] becomes [`LargestSize::Profile`] if the largest profiles are
+    /// all of one size, or if there is only one.
+    pub method: LargestSize,
+    /// The search, for [`LargestSize::Likelihood`].
+    pub likelihood: Option<LikelyParameter>,
+}
+
+/// The largest particle size.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: nothing counted, or as [`likely_parameter`].
+/// [`DensityError`]: no counted profile, or as [`likely_parameter`].
 ///
 /// ```
 /// use stereology::pipeline::{LargestSize, MeasuredProfiles, ParticleTypes, largest_particle};
 /// use stereology::unfold::UnfoldOptions;
 /// // Spheres of diameter 10, cut at even depths.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
-/// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
+/// let mut profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let types = ParticleTypes::parse(&["sphere"])?;
-/// let (size, _) = largest_particle(&profiles, &types, LargestSize::Corrected, &UnfoldOptions::default())?;
-/// assert!((size - 10.0).abs() < 0.01);
+/// let largest = largest_particle(&profiles, &types, LargestSize::Corrected, &UnfoldOptions::default())?;
+/// assert!((largest.size - 10.0).abs() < 0.01);
+/// // Profiles of one size cannot be extrapolated, and the result says so.
+/// profiles.sizes.fill(8.0);
+/// let largest = largest_particle(&profiles, &types, LargestSize::Corrected, &UnfoldOptions::default())?;
+/// assert_eq!((largest.size, largest.method), (8.0, LargestSize::Profile));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn largest_particle(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,
-    of: LargestSize,
+    method: LargestSize,
     options: &UnfoldOptions,
-) -> Result<(f64, Option<LikelyParameter>), DensityError> {
-    let counted = counted(profiles)?;
+) -> Result<LargestParticle, DensityError> {
+    let counted = Counted::of(profiles)?;
     let observed = counted.largest();
-    match of {
-        LargestSize::Given(size) => Ok((size, None)),
-        LargestSize::Profile => Ok((observed, None)),
-        LargestSize::Corrected => Ok((largest_size(&counted.sizes).map_or(observed, |found| found.value), None)),
+    let found = |size: f64, method: LargestSize| LargestParticle {
+        size,
+        method,
+        likelihood: None,
+    };
+    match method {
+        LargestSize::Given(size) => Ok(found(size, method)),
+        LargestSize::Profile => Ok(found(observed, method)),
+        LargestSize::Corrected => Ok(largest_size(&counted.sizes)
+            .map_or(found(observed, LargestSize::Profile), |corrected| {
+                found(corrected.value, method)
+            })),
         LargestSize::Likelihood => {
             let bins = equal_edges(observed * BEYOND, LIKELIHOOD_BINS);
             let counts = counted.counts(&bins, profiles.area)?;
@@ -111,8 +105,12 @@ pub fn largest_particle(
                     .map_err(|_| stereology_unfold::KernelError::Volume(size))
             };
             let range = (observed, observed * BEYOND);
-            let found = likely_parameter(&counts, &kernel, range, LEVEL, options)?;
-            Ok((found.value, Some(found)))
+            let likely = likely_parameter(&counts, &kernel, range, LEVEL, options)?;
+            Ok(LargestParticle {
+                size: likely.value,
+                method,
+                likelihood: Some(likely),
+            })
         }
     }
 }
@@ -121,11 +119,11 @@ const LIKELIHOOD_BINS: usize = 300;
 const SIZE_BINS: usize = 40;
 
 impl ParticleTypes {
-    /// The kernel of the types together under a capping angle (radians), as [`kernel`](Self::kernel) without one.
+    /// The kernel of the types together under a capping angle (radians); [`kernel`](Self::kernel) is that without one.
     ///
     /// # Errors
     ///
-    /// [`DensityError`]: edges that make no bins, an angle that is none.
+    /// [`DensityError`]: edges that do not form bins, an angle outside 0 to π/2.
     ///
     /// ```
     /// use stereology::kmatrix::Sizes;
@@ -133,7 +131,7 @@ impl ParticleTypes {
     /// use stereology::unfold::Method;
     /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Paper, Sizes::UpperEdge);
     /// let kernel = ParticleTypes::parse(&["sphere"])?.capped_kernel(0.5, &bins, Sizes::UpperEdge)?;
-    /// assert!((kernel.matrix().column(1).sum() - 0.5_f64.cos()).abs() < 1e-9); // so many of a sphere's profiles are seen
+    /// assert!((kernel.matrix().column(1).sum() - 0.5_f64.cos()).abs() < 1e-9); // the observed part of a sphere's profiles
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn capped_kernel(&self, angle: f64, bins: &UnfoldingBins, sizes: Sizes) -> Result<Kernel, DensityError> {
@@ -168,11 +166,11 @@ impl ParticleTypes {
     }
 }
 
-/// The capping angle, and if it is sought by likelihood the search; for bins between `edges`.
+/// The capping angle in radians, and the search for it ([`Capping::Likelihood`]); for bins between `edges`.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: nothing counted, or as [`likely_parameter`].
+/// [`DensityError`]: no counted profile, or as [`likely_parameter`].
 ///
 /// ```
 /// use stereology::pipeline::{Capping, MeasuredProfiles, ParticleTypes, capping_angle};
@@ -203,7 +201,7 @@ pub fn capping_angle(
                 options.method,
                 Sizes::Integrated,
             );
-            let counts = counted(profiles)?.counts(&bins.profile_edges, profiles.area)?;
+            let counts = Counted::of(profiles)?.counts(&bins.profile_edges, profiles.area)?;
             let kernel = |angle: f64| {
                 types
                     .capped_kernel(angle, &bins, Sizes::Integrated)
@@ -215,39 +213,42 @@ pub fn capping_angle(
     }
 }
 
-/// The shares of the types by likelihood, where profiles do not tell their type; for bins between `edges`.
+/// Fractions of the particle types of highest likelihood, where the types of the profiles are not known; for bins between `edges`.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: nothing counted, or as [`unknown_fractions`]: often the profiles do not tell.
+/// [`DensityError`]: a single type, no counted profile, or as [`unknown_fractions`]: often the profiles do not determine the fractions.
 ///
 /// ```
-/// use stereology::pipeline::{MeasuredProfiles, ParticleTypes, type_shares};
+/// use stereology::pipeline::{MeasuredProfiles, ParticleTypes, type_fractions};
 /// use stereology::unfold::UnfoldOptions;
 /// // Spheres of diameter 10, cut at even depths.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let types = ParticleTypes::parse(&["sphere", "ellipsoid:1,1,1.1"])?;
-/// // Either a share with an interval, or the word that the profiles do not tell.
-/// match type_shares(&profiles, &types, &[0.0, 5.0, 10.0], &UnfoldOptions::default()) {
-///     Ok(shares) => assert!((shares.fractions.iter().sum::<f64>() - 1.0).abs() < 1e-9),
-///     Err(error) => assert!(error.to_string().contains("do not tell")),
+/// // Either fractions with intervals, or the error that the profiles do not determine them.
+/// match type_fractions(&profiles, &types, &[0.0, 5.0, 10.0], &UnfoldOptions::default()) {
+///     Ok(found) => assert!((found.fractions.iter().sum::<f64>() - 1.0).abs() < 1e-9),
+///     Err(error) => assert!(error.to_string().contains("fractions of the types")),
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn type_shares(
+pub fn type_fractions(
     profiles: &MeasuredProfiles,
     types: &ParticleTypes,
     edges: &[f64],
     options: &UnfoldOptions,
 ) -> Result<Fractions, DensityError> {
+    if types.types().len() < 2 {
+        return Err(DensityError::OneType);
+    }
     let bins = UnfoldingBins::new(
         edges,
         options.min_size.unwrap_or(0.0),
         options.method,
         Sizes::Integrated,
     );
-    let counts = counted(profiles)?.counts(&bins.profile_edges, profiles.area)?;
+    let counts = Counted::of(profiles)?.counts(&bins.profile_edges, profiles.area)?;
     let kernels = types
         .types()
         .iter()
@@ -259,4 +260,11 @@ pub fn type_shares(
         })
         .collect::<Result<Vec<_>, DensityError>>()?;
     Ok(unknown_fractions(&counts, &kernels, LEVEL, options)?)
+}
+
+/// The kernel with its bins summed to those between `edges`.
+pub(crate) fn reported(kernel: Kernel, edges: &[f64]) -> Result<Kernel, DensityError> {
+    kernel
+        .reported_in(edges)
+        .map_err(|error| DensityError::Unfold(UnfoldError::Reported(error)))
 }

@@ -1,19 +1,7 @@
-//! Size bins: how many, how spaced, from where to where.
+//! Edges of the size bins.
 
-use crate::pipeline::{DensityError, DensityOptions, MeasuredProfiles};
+use crate::pipeline::{DensityError, DensityOptions, MeasuredProfiles, Spacing};
 use stereology_unfold::{automatic_bins, equal_edges, geometric_edges, phi_edges};
-
-/// How size bins are spaced.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Spacing {
-    /// Of equal width, from 0.
-    #[default]
-    Equal,
-    /// Of equal ratio; the first is everything up to the smallest size that is seen.
-    Geometric,
-    /// Krumbein's half φ: edges at powers of √2 of the unit, whatever the number of bins.
-    Phi,
-}
 
 /// More bins than this are not chosen automatically.
 const MOST_BINS: usize = 50;

@@ -4,14 +4,15 @@
 
 use crate::pipeline::colouring::particle_colours;
 use crate::pipeline::{
-    DensityError, DensityOptions, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes, Population,
-    PopulationFailure, Recipe, Verification, VerificationError, Warning, fine_details, particle_densities, population,
-    verify,
+    DensityError, DensityOptions, Evidence, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes,
+    Population, PopulationFailure, Recipe, ResidualSpectra, Verdict, Verification, VerificationError, fine_details,
+    population, residual_spectra, unfold_profiles, verify,
 };
 use image::RgbImage;
 use ndarray::Array2;
 use std::ops::ControlFlow;
 use stereology_anneal::{PackError, PackOptions, Packing, pack, populate};
+use stereology_metrics::Finding;
 use stereology_pyramid::{TextureError, TextureOptions};
 use stereology_segment::{SegmentError, SegmentOptions, Segmentation, segment};
 use stereology_shape::{Arrangement, ArrangementError};
@@ -109,8 +110,12 @@ pub struct Synthesis {
     pub solid: Solid,
     /// Its sections beside the photograph.
     pub verification: Verification,
-    /// Everything a reader should know, in the order of the steps.
-    pub warnings: Vec<Warning>,
+    /// Power spectra of the residual in photograph and sections; `None` if either is too small or all outlines.
+    pub spectra: Option<ResidualSpectra>,
+    /// Whether to trust the result.
+    pub verdict: Verdict,
+    /// Remarks of all steps, in their order.
+    pub findings: Vec<Finding>,
 }
 
 /// A solid that could not be made.
@@ -211,11 +216,13 @@ pub fn synthesize(
         None => segment(photo, &options.segment, &|done| progress(Step::Segment, done))?,
     };
     let profiles = measured_profiles(&segmentation, options.pixel);
-    let densities = particle_densities(&profiles, types, &options.densities, &|done| {
+    let densities = unfold_profiles(&profiles, types, &options.densities, &|done| {
         progress(Step::Unfold, done)
     })?;
     let fraction = options.fraction.unwrap_or(segmentation.area_fraction);
     let texture_period = options.texture_voxels as f64 * options.pixel;
+    // With the fractions of the fit.
+    let types = &densities.types;
     let population = population(
         &densities,
         types,
@@ -248,14 +255,28 @@ pub fn synthesize(
     let verification = verify(&solid, &segmentation, &profiles, recipe, options.pixel, &|done| {
         progress(Step::Verify, done)
     })?;
-    let mut warnings: Vec<Warning> = segmentation
+    let mut findings: Vec<Finding> = segmentation
         .findings
         .iter()
-        .map(|finding| Warning::new(finding.code, finding.message.clone()))
+        .map(|finding| Finding::new(finding.code, finding.message.clone()))
         .collect();
-    warnings.extend(densities.warnings());
-    warnings.extend(population.warnings.iter().cloned());
-    warnings.extend(details.warnings.iter().cloned());
+    let spectra = residual_spectra(&segmentation, &solid, options.pixel).ok();
+    let verdict = Verdict::new(&Evidence {
+        findings: findings.clone(),
+        profiles: verification.exact.profiles_photo,
+        deviance: densities.all.deviance,
+        degrees_of_freedom: densities.all.degrees_of_freedom,
+        total: densities.all.total,
+        volume_fraction: population.unfolded_fraction,
+        area_fraction: segmentation.area_fraction,
+        smallest_gap: packing.certificate().least_gap / mean_size(&packing),
+        exact: verification.exact,
+        resegmented: verification.resegmented,
+        texture_error: spectra.as_ref().map(ResidualSpectra::log_error),
+    });
+    for of_step in [&densities.findings, &population.findings, &details.findings] {
+        findings.extend(of_step.iter().cloned());
+    }
     Ok(Synthesis {
         segmentation,
         profiles,
@@ -265,8 +286,15 @@ pub fn synthesize(
         details,
         solid,
         verification,
-        warnings,
+        spectra,
+        verdict,
+        findings,
     })
+}
+
+fn mean_size(packing: &Packing) -> f64 {
+    let particles = packing.particles();
+    particles.iter().map(|particle| particle.size).sum::<f64>() / particles.len().max(1) as f64
 }
 
 /// The profiles of a segmentation in the unit of length, ready to be unfolded.

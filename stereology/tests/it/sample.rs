@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use stereology::pipeline::{
-    DensityOptions, Extent, ParticleDensities, ParticleTypes, SynthesisOptions, measured_profiles, particle_densities,
-    synthesize,
+    DensityOptions, Extent, ParticleDensities, ParticleTypes, SynthesisOptions, measured_profiles, synthesize,
+    unfold_profiles,
 };
 use stereology::pyramid::{Mode, TextureOptions};
 use stereology::sample::{self, TrueCategory, Truth};
@@ -37,7 +37,7 @@ fn segmentation() -> &'static Segmentation {
 
 fn densities() -> ParticleDensities {
     let profiles = measured_profiles(segmentation(), 1.0);
-    particle_densities(&profiles, &types(), &DensityOptions::default(), &|_| {
+    unfold_profiles(&profiles, &types(), &DensityOptions::default(), &|_| {
         ControlFlow::Continue(())
     })
     .unwrap()

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use stereology::anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, particle_densities, population};
+use stereology::pipeline::{DensityOptions, Extent, MeasuredProfiles, ParticleTypes, population, unfold_profiles};
 use stereology::shape::Arrangement;
 use stereology::unfold::{Method, ProfileCounts, UnfoldOptions, equal_edges, unfold};
 use stereology::volume::{Axis, Solid};
@@ -41,7 +41,7 @@ proptest! {
             sizes,
             ..MeasuredProfiles::default()
         };
-        let found = particle_densities(&profiles, &types, &DensityOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
+        let found = unfold_profiles(&profiles, &types, &DensityOptions::default(), &|_| ControlFlow::Continue(())).unwrap();
         prop_assert!((found.all.total.value / number_density - 1.0).abs() < 0.15, "{} {number_density}", found.all.total.value);
         prop_assert!((found.all.volume_fraction.value / fraction - 1.0).abs() < 0.15, "{} {fraction}", found.all.volume_fraction.value);
     }
@@ -85,7 +85,7 @@ proptest! {
             unfold: UnfoldOptions::default().with_method(Method::Nnls),
             ..DensityOptions::default()
         };
-        let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
+        let found = unfold_profiles(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
         let drawn = population(&found, &types, fraction, Extent::Count(800), 20.0, 1).unwrap();
         let volume: f64 = drawn.grains.iter().map(|grain| types.unit_bodies()[grain.shape].volume() * grain.size.powi(3)).sum();
         prop_assert!((volume / drawn.period.volume() - fraction).abs() < 1e-9);
@@ -114,7 +114,7 @@ fn largest_profiles_of_meshes_are_explained() {
             bins,
             ..DensityOptions::default()
         };
-        let found = particle_densities(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
+        let found = unfold_profiles(&profiles, &types, &options, &|_| ControlFlow::Continue(())).unwrap();
         assert!(found.all.total.value > 0.0);
     }
 }

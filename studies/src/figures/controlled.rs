@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 use stereology::anneal::{Grain, PackOptions, Packing, lognormal_sizes, pack, populate, scale_to_fraction};
 use stereology::pipeline::{
     DensityOptions, Extent, MeasuredProfiles, ParticleDensities, ParticleTypes, fine_details, measured_profiles,
-    particle_colours, particle_densities, population,
+    particle_colours, population, unfold_profiles,
 };
 use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
 use stereology::render::{Camera, RenderOptions, render_mesh};
@@ -192,7 +192,7 @@ pub fn draw(folder: &Path) -> Result<()> {
         unfold: UnfoldOptions::default().with_bootstrap(Bootstrap::default()),
         ..DensityOptions::default()
     };
-    let densities = particle_densities(&pooled(&found), &types, &options, &|_| ControlFlow::Continue(()))?;
+    let densities = unfold_profiles(&pooled(&found), &types, &options, &|_| ControlFlow::Continue(()))?;
     write_densities(&known, &densities, &folder.join("figure-10-controlled.csv"))?;
     let copy = copy(&types, &found, &densities)?;
     let plain = copy.without_residual();

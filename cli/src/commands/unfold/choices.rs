@@ -4,7 +4,9 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{self, Capping, DensityOptions, LargestSize, ParticleTypes};
+use stereology::pipeline::{
+    self, Capping, DensityOptions, LargestSize, ParticleTypes, SeparateCategories, TypeFractions,
+};
 use stereology::unfold::{self, Bootstrap, Resampling, UnfoldOptions};
 
 use crate::failure::{Explain, Failure, body};
@@ -167,6 +169,8 @@ impl Choices {
             max_size: self.largest(scale),
             capping: self.capping(),
             sizes: self.sizes(),
+            fractions: TypeFractions::Given,
+            categories: SeparateCategories::WhereSizesDiffer,
             unfold: UnfoldOptions {
                 method: self.method.estimator(),
                 min_size: self.min_size.map(|size| size * scale),

@@ -10,10 +10,10 @@ use clap::Args;
 use serde_json::{Value, json};
 use stereology::files::DensityRows;
 use stereology::pipeline::{
-    Capping, CategoryDensities, DensityOptions, MeasuredProfiles, Spacing, capping_angle, category_densities,
-    largest_particle, particle_densities, size_edges, type_densities, type_shares,
+    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, SeparateCategories, TypeFractions,
+    unfold_profiles,
 };
-use stereology::unfold::{Estimate, Interval, TypesUnfolding, Unfolding, equal_edges};
+use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -23,7 +23,6 @@ use crate::outputs::check_file;
 use crate::profile_table::{TableProfile, read_profiles};
 use crate::progress::{Step, go_on};
 use crate::values::{Window, count, positive};
-use crate::warnings::Warning;
 
 pub use choices::{Choices, Defaults, types};
 pub use edge_rule::EdgeRule;
@@ -83,73 +82,25 @@ pub struct Unfold {
     pub output: Option<PathBuf>,
 }
 
-/// What the table tells of every profile; nothing if it does not of some.
-fn all(profiles: &[TableProfile], of: impl Fn(&TableProfile) -> Option<usize>) -> Vec<usize> {
-    let told: Option<Vec<usize>> = profiles.iter().map(of).collect();
-    told.unwrap_or_default()
+/// A column of the table; empty if it is missing.
+fn column(profiles: &[TableProfile], of: impl Fn(&TableProfile) -> Option<usize>) -> Vec<usize> {
+    let values: Option<Vec<usize>> = profiles.iter().map(of).collect();
+    values.unwrap_or_default()
 }
 
-/// Several types as one unfolding: eq. (9). Method, penalty and threshold are those of the first; findings stay with their types.
-fn summed(found: &TypesUnfolding) -> Unfolding {
-    let mut sum = found.types[0].clone();
-    sum.number_density.clone_from(&found.number_density);
-    sum.intervals.clone_from(&found.intervals);
-    (sum.total, sum.mean_size, sum.volume_fraction) = (found.total, found.mean_size, found.volume_fraction);
-    (sum.surface_density, sum.distribution) = (found.surface_density, found.distribution.clone());
-    sum.observed.clone_from(&found.observed);
-    sum.refolded.clone_from(&found.refolded);
-    sum.findings.clear();
-    for part in &found.types[1..] {
-        sum.profiles += part.profiles;
-        for (sum, part) in [
-            (&mut sum.profiles_per_area, part.profiles_per_area),
-            (&mut sum.area_fraction, part.area_fraction),
-        ] {
-            sum.observed += part.observed;
-            sum.expected += part.expected;
-        }
-        sum.deviance += part.deviance;
-        sum.degrees_of_freedom += part.degrees_of_freedom;
-        sum.condition_number = sum.condition_number.max(part.condition_number);
-        sum.clamped_bins.extend(&part.clamped_bins);
+/// densities.csv: all together, each type, each category.
+fn rows(found: &ParticleDensities) -> DensityRows {
+    let mut rows = DensityRows::default();
+    rows.unfolding(&found.all, None, None);
+    for (kind, part) in found.by_type.iter().enumerate() {
+        rows.unfolding(part, Some(kind), None);
     }
-    sum
-}
-
-/// As many equal bins as there are profiles, if more were asked for.
-fn fewer_bins(edges: &[f64], profiles: &MeasuredProfiles, options: &DensityOptions) -> Option<Vec<f64>> {
-    let counted = profiles.weights.iter().filter(|weight| **weight > 0.0).count();
-    let equal = options.edges.is_none() && options.spacing == Spacing::Equal;
-    (equal && edges.len() - 1 > counted).then(|| equal_edges(edges[edges.len() - 1], counted.max(1)))
-}
-
-/// What was found, of one type or of several together.
-struct Found {
-    sum: Unfolding,
-    by_type: Vec<Unfolding>,
-    by_category: Option<CategoryDensities>,
-}
-
-impl Found {
-    /// densities.csv: all together, each type, each category.
-    fn rows(&self) -> DensityRows {
-        let mut rows = DensityRows::default();
-        rows.unfolding(&self.sum, None, None);
-        for (kind, part) in self.by_type.iter().enumerate() {
-            rows.unfolding(part, Some(kind), None);
+    if let Some(of) = &found.categories {
+        for ((category, kind), part) in of.categories.iter().zip(&of.kinds).zip(&of.found.types) {
+            rows.unfolding(part, *kind, Some(usize::from(*category)));
         }
-        if let Some(CategoryDensities {
-            categories,
-            kinds,
-            found,
-        }) = &self.by_category
-        {
-            for ((category, kind), part) in categories.iter().zip(kinds).zip(&found.types) {
-                rows.unfolding(part, *kind, Some(usize::from(*category)));
-            }
-        }
-        rows
     }
+    rows
 }
 
 impl Unfold {
@@ -157,168 +108,83 @@ impl Unfold {
         if let Some(output) = &self.output {
             check_file(output, everywhere.force)?;
         }
-        let choices = &self.choices;
-        let scale = everywhere.scale;
-        let mut options = choices.density_options(scale, everywhere.seed, &DEFAULTS);
-        let of = &mut options.unfold;
-        of.tolerance = self.tolerance.unwrap_or(of.tolerance);
-        of.max_iterations = self.iterations.unwrap_or(of.max_iterations);
+        let measured = self.measured(everywhere.scale)?;
+        let types = self.choices.types()?;
+        let options = self.options(everywhere);
+        let step = Step::begin("unfolding", everywhere.quiet);
+        let found = unfold_profiles(&measured, &types, &options, &|done| step.at(done))
+            .map_err(|error| self.failure(&error))?;
+        drop(step);
+        go_on()?;
+        if let Some(output) = &self.output {
+            rows(&found).write(output).at(output)?;
+        }
+        Ok(self.answer(&found))
+    }
+
+    /// The table, in the unit of the run.
+    fn measured(&self, scale: f64) -> Result<MeasuredProfiles, Failure> {
         let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
         if let Some(rule) = self.edge_rule {
             // Boxes and window in the unit of the table: weights have none.
             rule.weigh(&mut profiles, self.window.map(|Window(sides)| sides))?;
         }
-        profiles.iter_mut().for_each(|profile| profile.size *= scale);
-        let mut types = choices.types()?;
-        let area = self.area * scale * scale;
-        let measured = MeasuredProfiles {
-            sizes: profiles.iter().map(|profile| profile.size).collect(),
+        Ok(MeasuredProfiles {
+            sizes: profiles.iter().map(|profile| profile.size * scale).collect(),
             weights: profiles.iter().map(|profile| profile.weight).collect(),
             categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
-            slices: all(&profiles, |profile| profile.slice),
-            types: all(&profiles, |profile| profile.kind),
-            area,
+            slices: column(&profiles, |profile| profile.slice),
+            types: column(&profiles, |profile| profile.kind),
+            area: self.area * scale * scale,
             min_size: 0.0,
-        };
-        let (largest, likely_size) =
-            largest_particle(&measured, &types, options.max_size, &options.unfold).at(&self.profiles)?;
-        let edges = size_edges(&measured, largest, &options).at(&self.profiles)?;
-        let fewer = fewer_bins(&edges, &measured, &options);
-        let edges = fewer.clone().unwrap_or(edges);
-        let (angle, likely_angle) =
-            capping_angle(&measured, &types, options.capping, &edges, &options.unfold).at(&self.profiles)?;
-        if self.unknown_fractions && types.types().len() < 2 {
-            return Err(Failure::usage("--unknown-fractions needs two or more --shape"));
-        }
-        let fractions = if self.unknown_fractions {
-            let found = type_shares(&measured, &types, &edges, &options.unfold).at(&self.profiles)?;
-            types = types.with_shares(&found.fractions).or_fail()?;
-            Some(found)
-        } else {
-            None
-        };
-        let step = Step::begin("unfolding", everywhere.quiet);
-        let progress = |done: f64| step.at(done);
-
-        let options = DensityOptions {
-            edges: Some(edges.clone()),
-            capping: Capping::Angle(angle),
-            ..options
-        };
-        let kinds = types.types().len();
-        if let Some(kind) = profiles.iter().find_map(|of| of.kind.filter(|kind| *kind >= kinds)) {
-            return Err(Failure::run(format!(
-                "{}: a profile has type {kind}, but there are {kinds} --shape (types are numbered from 0)",
-                self.profiles.display(),
-            )));
-        }
-        let by_category = category_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
-        let found = if kinds > 1 && !measured.types.is_empty() {
-            let found = type_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
-            Found {
-                sum: summed(&found),
-                by_type: found.types,
-                by_category,
-            }
-        } else {
-            let found = particle_densities(&measured, &types, &options, &progress).at(&self.profiles)?;
-            Found {
-                sum: found.all,
-                by_type: Vec::new(),
-                by_category,
-            }
-        };
-        drop(step);
-        go_on()?;
-        if let Some(output) = &self.output {
-            found.rows().write(output).at(output)?;
-        }
-        let mut answer = self.answer(&found, &profiles);
-        if fewer.is_some() {
-            let (bins, count) = (edges.len() - 1, profiles.len());
-            answer.warn(Warning::new(
-                "fewer-bins",
-                format!("{count} profiles do not bear more bins than profiles: {bins} equal bins were used"),
-            ));
-        }
-        for (name, likely) in [("max_size", likely_size), ("capping_angle", likely_angle)] {
-            if let Some(likely) = likely {
-                let (scale, unit) = if name == "max_size" {
-                    (1.0, "")
-                } else {
-                    (1.0_f64.to_degrees(), " degrees")
-                };
-                let [value, lower, upper] =
-                    [likely.value, likely.interval.lower, likely.interval.upper].map(|v| v * scale);
-                answer.field(
-                    name,
-                    json!({ "value": value, "lower": lower, "upper": upper, "unbounded": likely.unbounded }),
-                );
-                answer.line(format!(
-                    "{} by likelihood    {} ({} to {}){unit}",
-                    name.replace('_', " "),
-                    significant(value),
-                    significant(lower),
-                    significant(upper)
-                ));
-            }
-        }
-        if let Some(fractions) = fractions {
-            answer.field("fractions", json!(fractions.fractions));
-            answer.field(
-                "fractions_lower",
-                fractions.intervals.iter().map(|of| of.lower).collect::<Vec<_>>(),
-            );
-            answer.field(
-                "fractions_upper",
-                fractions.intervals.iter().map(|of| of.upper).collect::<Vec<_>>(),
-            );
-            answer.field("fractions_condition_number", json!(fractions.condition_number));
-            let shown: Vec<String> = fractions.fractions.iter().map(|&share| percent(share)).collect();
-            answer.line(format!("shares of the shapes        {}", shown.join(", ")));
-        }
-        Ok(answer)
+        })
     }
 
-    fn answer(&self, found: &Found, profiles: &[TableProfile]) -> Answer {
-        let Found {
-            sum,
-            by_type,
-            by_category,
-        } = found;
+    fn options(&self, everywhere: &Everywhere) -> DensityOptions {
+        let mut options = self
+            .choices
+            .density_options(everywhere.scale, everywhere.seed, &DEFAULTS);
+        options.categories = SeparateCategories::Always;
+        if self.unknown_fractions {
+            options.fractions = TypeFractions::Likelihood;
+        }
+        let of = &mut options.unfold;
+        of.tolerance = self.tolerance.unwrap_or(of.tolerance);
+        of.max_iterations = self.iterations.unwrap_or(of.max_iterations);
+        options
+    }
+
+    fn failure(&self, error: &DensityError) -> Failure {
+        let advice = match error {
+            DensityError::OneType => return Failure::usage("--unknown-fractions needs two or more --shape"),
+            DensityError::UnknownType { .. } => ": give a --shape for every type",
+            DensityError::EmptyType { .. } => ", with its --shape",
+            DensityError::NoProfiles(_) => " (--edge-rule)",
+            _ => "",
+        };
+        Failure::run(format!("{}: {error}{advice}", self.profiles.display()))
+    }
+
+    fn answer(&self, found: &ParticleDensities) -> Answer {
+        let sum = &found.all;
         let mut answer = Answer::new("unfold");
         for (name, value) in figures(sum, self.choices.kernel_name()) {
             answer.field(name, value);
         }
-        if !by_type.is_empty() {
+        if !found.by_type.is_empty() {
             let names = self.choices.shape.iter().map(|shape| &shape.shape);
             let types: Vec<Value> = names
-                .zip(by_type)
+                .zip(&found.by_type)
                 .map(|(shape, part)| json!({ "shape": shape, "number_density": part.number_density }))
                 .collect();
             answer.field("types", types);
         }
-        if let Some(of) = by_category {
+        if let Some(of) = &found.categories {
             answer.field("categories", categories(of));
             answer.field("categories_sum", group_figures(&Group::sum(&of.found)));
         }
-        for finding in &sum.findings {
-            answer.warn(Warning::new(finding.code, finding.message.clone()));
-        }
-        for (kind, part) in by_type.iter().enumerate() {
-            for finding in &part.findings {
-                answer.warn(Warning::new(finding.code, format!("type {kind}: {}", finding.message)));
-            }
-        }
-        let unlabelled = profiles.iter().filter(|profile| profile.kind.is_none()).count();
-        if unlabelled > 0 && unlabelled < profiles.len() {
-            answer.warn(Warning::new(
-                "types-ignored",
-                format!(
-                    "{unlabelled} of {} profiles have no type, so types were not used",
-                    profiles.len()
-                ),
-            ));
+        for finding in &found.findings {
+            answer.warn(finding.clone());
         }
         let ranged = |estimate: Estimate, shown: fn(f64) -> String| match estimate.interval {
             Some(Interval { lower, upper }) => {
@@ -359,6 +225,44 @@ impl Unfold {
                 significant(bin[1])
             ));
         }
+        let largest = found.settled.largest.as_ref().and_then(|of| of.likelihood.as_ref());
+        if let Some(likely) = largest {
+            estimated(&mut answer, "max_size", likely, 1.0, "");
+        }
+        if let Some(likely) = &found.settled.capping {
+            estimated(&mut answer, "capping_angle", likely, 1.0_f64.to_degrees(), " degrees");
+        }
+        if let Some(found) = &found.settled.fractions {
+            fractions(&mut answer, found);
+        }
         answer
     }
+}
+
+/// A parameter of highest likelihood, in units of 1 / `scale`.
+fn estimated(answer: &mut Answer, name: &str, likely: &LikelyParameter, scale: f64, unit: &str) {
+    let [value, lower, upper] = [likely.value, likely.interval.lower, likely.interval.upper].map(|v| v * scale);
+    answer.field(
+        name,
+        json!({ "value": value, "lower": lower, "upper": upper, "unbounded": likely.unbounded }),
+    );
+    answer.line(format!(
+        "{} by likelihood    {} ({} to {}){unit}",
+        name.replace('_', " "),
+        significant(value),
+        significant(lower),
+        significant(upper)
+    ));
+}
+
+/// Fractions of the particle types of highest likelihood.
+fn fractions(answer: &mut Answer, found: &Fractions) {
+    let ends = |end: fn(&Interval) -> f64| found.intervals.iter().map(end).collect::<Vec<_>>();
+    answer
+        .field("fractions", json!(found.fractions))
+        .field("fractions_lower", ends(|of| of.lower))
+        .field("fractions_upper", ends(|of| of.upper))
+        .field("fractions_condition_number", json!(found.condition_number));
+    let shown: Vec<String> = found.fractions.iter().map(|&fraction| percent(fraction)).collect();
+    answer.line(format!("fractions of the shapes     {}", shown.join(", ")));
 }

@@ -1,0 +1,81 @@
+//! The bins of a fit: fine profile bins and fine size bins, with edges at the reported bins and at the threshold.
+
+use crate::pipeline::ParticleTypes;
+use stereology_kmatrix::Sizes;
+use stereology_unfold::{Method, divided_edges};
+
+/// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
+/// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnfoldingBins {
+    /// Edges of the profile bins.
+    pub profile_edges: Vec<f64>,
+    /// Edges of the size bins of the kernel; those of the reported bins are among them.
+    pub size_edges: Vec<f64>,
+}
+
+/// A hundred profile bins or more lose nothing that shows in the densities.
+const PROFILE_BINS: usize = 100;
+/// Forty size bins or more make the smooth estimate as smooth as can be seen.
+const SIZE_BINS: usize = 40;
+
+impl UnfoldingBins {
+    /// Bins for densities in the bins between `edges`, from a threshold (0: none) on.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
+    /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Auto, Sizes::Integrated);
+    /// assert_eq!((bins.profile_edges.len(), bins.size_edges.len()), (101, 41));
+    /// ```
+    #[must_use]
+    pub fn new(edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> Self {
+        if method == Method::Paper {
+            return Self {
+                profile_edges: edges.to_vec(),
+                size_edges: edges.to_vec(),
+            };
+        }
+        Self {
+            profile_edges: divided_edges(edges, PROFILE_BINS, threshold),
+            size_edges: match sizes {
+                Sizes::Integrated => divided_edges(edges, SIZE_BINS, threshold),
+                Sizes::UpperEdge => edges.to_vec(),
+            },
+        }
+    }
+}
+
+/// The highest profile bin is widened until it holds this share of the profiles of the largest particles. A body's largest section may hardly ever be met (for
+/// a mesh: never, by any plane that was tried), and a profile there would not be explained, or count for far too many particles.
+const TOP_SHARE: f64 = 0.01;
+
+impl ParticleTypes {
+    /// [`UnfoldingBins::new`] with the highest profile bin so wide that every type shows profiles in it.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
+    /// let edges = [0.0, 0.5, 1.0];
+    /// let top = |shape: &str| {
+    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.0, Method::Auto, Sizes::Integrated);
+    ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
+    /// };
+    /// assert_eq!(top("sphere")?, 0.99);
+    /// assert!(top("box:1,1,2")? < 0.99); // hardly ever cut through two opposite edges
+    /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
+    /// ```
+    #[must_use]
+    pub fn unfolding_bins(&self, edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> UnfoldingBins {
+        let mut bins = UnfoldingBins::new(edges, threshold, method, sizes);
+        let (Some(&largest), false) = (edges.last(), method == Method::Paper) else {
+            return bins;
+        };
+        let shown = |edge: f64| {
+            let shares = self.types().iter().map(|of| 1.0 - of.law().cdf(edge / largest));
+            shares.fold(1.0, f64::min) >= TOP_SHARE
+        };
+        let inner = bins.profile_edges.len() - 1;
+        let kept = (1..inner).rev().find(|&k| shown(bins.profile_edges[k])).unwrap_or(0);
+        bins.profile_edges.drain(kept + 1..inner);
+        bins
+    }
+}

@@ -1,10 +1,7 @@
 //! What the labels given so far allow the other triangles: lower and upper bounds, spread over the surface as far as they matter.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "triangles and levels are numbered in 32 bits"
-)]
 
 use crate::budget::Levels;
+use crate::conversions::{index, whole_part};
 use crate::dual::DualGraph;
 use crate::wavefront::Wavefront;
 
@@ -117,7 +114,7 @@ impl<'a> Region<'a> {
             }
             // Values come level by level: who leaves a level for a higher one has left before others come.
             if value >= 0.0 && !labelled[t as usize] {
-                let level = (value / self.height) as usize;
+                let level = whole_part(value / self.height);
                 let counted = self.counted[t as usize] as usize;
                 if counted != level + 1 {
                     let weight = self.weights[t as usize];
@@ -125,7 +122,7 @@ impl<'a> Region<'a> {
                         self.forced[counted - 1] -= weight;
                     }
                     self.forced[level] += weight;
-                    self.counted[t as usize] = level as u32 + 1;
+                    self.counted[t as usize] = index(level) + 1;
                     self.came[level].push(t);
                     if !self.fits(level, limit) {
                         return self.refuse(seeds, labelled);

@@ -1,7 +1,7 @@
 //! How much of the mesh each interval of distances gets: the histogram in whole numbers (section 4.3 and figure 9).
-#![allow(clippy::cast_possible_truncation, reason = "shares of a total that is whole")]
 
 use crate::contact::ContactDistribution;
+use crate::conversions::whole_weight;
 
 /// Units of weight of a mean triangle, where triangles count by area: small enough that rounding does not matter, large enough for a billion triangles.
 pub(crate) const UNIT: i64 = 1 << 20;
@@ -12,7 +12,7 @@ pub(crate) fn area_weights(areas: &[f64]) -> Vec<i64> {
     areas
         .iter()
         // A triangle without area still takes part.
-        .map(|area| ((area / mean * UNIT as f64).round() as i64).max(1))
+        .map(|area| whole_weight((area / mean * UNIT as f64).round()).max(1))
         .collect()
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn largest_remainders(shares: &[f64], total: i64) -> Vec<i64> {
         return vec![0; shares.len()];
     }
     let exact: Vec<f64> = shares.iter().map(|share| share / sum * total as f64).collect();
-    let mut whole: Vec<i64> = exact.iter().map(|x| x.floor() as i64).collect();
+    let mut whole: Vec<i64> = exact.iter().map(|x| whole_weight(x.floor())).collect();
     let mut missing = total - whole.iter().sum::<i64>();
     let mut order: Vec<usize> = (0..shares.len()).collect();
     let remainder = |i: usize| exact[i] - exact[i].floor();

@@ -1,11 +1,8 @@
 //! How far the points of two regions lie from the interface between them: a histogram with a sign.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "bins are checked against their largest number before"
-)]
 
 use serde::{Deserialize, Serialize};
 
+use crate::conversions::whole_part;
 use crate::error::MicrogeometryError;
 
 /// Most bins a region may have.
@@ -115,7 +112,7 @@ impl ContactDistribution {
         for (distance, weight) in distances {
             let bin = (distance.abs() / bin_width).floor();
             if bin.is_nan() || bin >= MOST_BINS as f64 {
-                let (bins, most) = (bin.min(1e15) as usize, MOST_BINS);
+                let (bins, most) = (whole_part(bin.min(1e15)), MOST_BINS);
                 return Err(MicrogeometryError::TooManyBins { bins, most });
             }
             let side = if distance.is_sign_negative() {
@@ -123,7 +120,7 @@ impl ContactDistribution {
             } else {
                 &mut positive
             };
-            let bin = bin as usize;
+            let bin = whole_part(bin);
             if side.len() <= bin {
                 side.resize(bin + 1, 0.0);
             }

@@ -1,13 +1,10 @@
 //! Distances over a mesh: the graph whose nodes are the triangles' centroids.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "meshes number their triangles in 32 bits"
-)]
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::TriangleMesh;
 
+use crate::conversions::{index, single};
 use crate::error::MicrogeometryError;
 use crate::wavefront::Wavefront;
 
@@ -121,7 +118,7 @@ impl Link {
 
 /// The nearest number of single precision that is not larger; lengths are finite and not negative.
 pub(crate) fn rounded_down(length: f64) -> f32 {
-    let near = length as f32;
+    let near = single(length);
     if f64::from(near) > length {
         near.next_down()
     } else {
@@ -171,14 +168,14 @@ impl DualGraph {
                 most: around.sizes().max().unwrap_or_default(),
             });
         }
-        let numbers: Vec<u32> = (0..count as u32).collect();
+        let numbers: Vec<u32> = (0..index(count)).collect();
         let blocks: Vec<(Vec<u32>, Vec<Link>)> = numbers
             .par_chunks(BLOCK)
             .map(|block| {
                 let (mut sizes, mut links, mut near) = (Vec::with_capacity(block.len()), Vec::new(), Vec::new());
                 for &t in block {
                     around.neighbours(&mesh.triangles[t as usize], t, adjacency, &mut near);
-                    sizes.push(near.len() as u32);
+                    sizes.push(index(near.len()));
                     links.extend(near.iter().map(|&to| Link {
                         // The same bits from both ends: the lower triangle first.
                         length: rounded_down(
@@ -280,7 +277,7 @@ impl DualGraph {
         for &(t, d) in from {
             negated[t] = negated[t].max(-d);
         }
-        let sources: Vec<(u32, f64)> = from.iter().map(|&(t, _)| (t as u32, negated[t])).collect();
+        let sources: Vec<(u32, f64)> = from.iter().map(|&(t, _)| (index(t), negated[t])).collect();
         spread(self, &mut negated, &sources);
         negated.into_iter().map(|d| -d).collect()
     }
@@ -297,7 +294,7 @@ impl DualGraph {
                 continue;
             }
             seen[start] = true;
-            let mut piece = vec![start as u32];
+            let mut piece = vec![index(start)];
             let mut next = 0;
             while let Some(&t) = piece.get(next) {
                 next += 1;
@@ -354,7 +351,7 @@ impl Around {
         let mut triangles = vec![0; 3 * mesh.triangles.len()];
         for (t, corners) in mesh.triangles.iter().enumerate() {
             for &v in corners {
-                triangles[next[v as usize]] = t as u32;
+                triangles[next[v as usize]] = index(t);
                 next[v as usize] += 1;
             }
         }

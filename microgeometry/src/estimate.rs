@@ -1,13 +1,10 @@
 //! Contact distributions measured on pictures and volumes (section 5.3 and figure 8 of the paper).
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "distances in pixels of a picture in memory"
-)]
 
 use ndarray::{ArrayView2, ArrayView3, Axis};
 use stereology_imaging::distance_to_other_region;
 
 use crate::contact::{ContactDistribution, MOST_BINS};
+use crate::conversions::whole_part;
 use crate::error::MicrogeometryError;
 
 /// How distances are measured and counted.
@@ -162,7 +159,7 @@ struct LifeTable {
 
 impl LifeTable {
     fn new(width: f64, largest: f64) -> Self {
-        let bins = (largest / width).ceil() as usize + 1;
+        let bins = whole_part((largest / width).ceil()) + 1;
         Self {
             width,
             seen: vec![0.0; bins],
@@ -171,7 +168,7 @@ impl LifeTable {
     }
 
     fn bin(&self, distance: f64) -> usize {
-        ((distance / self.width).max(0.0) as usize).min(self.seen.len() - 1)
+        whole_part(distance / self.width).min(self.seen.len() - 1)
     }
 
     /// A distance somewhere in an interval.

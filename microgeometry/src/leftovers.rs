@@ -1,5 +1,6 @@
 //! Triangles that the histogram has no label for get one that breaks no bound.
 
+use crate::conversions::index;
 use crate::dual::{DualGraph, spread};
 
 /// What the labelled triangles allow all others: x is at least max(xₐ − d) and at most min(xₐ + d), two searches from all of them at once.
@@ -15,8 +16,7 @@ pub(crate) fn bounds(graph: &DualGraph, labelled: &[bool], labels: &[f64]) -> (V
         let mut bound: Vec<f64> = given
             .map(|(&known, x)| if known { sign * x } else { f64::NEG_INFINITY })
             .collect();
-        #[allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
-        let sources: Vec<(u32, f64)> = beside.iter().map(|&t| (t as u32, bound[t])).collect();
+        let sources: Vec<(u32, f64)> = beside.iter().map(|&t| (index(t), bound[t])).collect();
         spread(graph, &mut bound, &sources);
         bound
     };

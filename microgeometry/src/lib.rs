@@ -57,6 +57,7 @@
 mod bounds;
 mod budget;
 mod contact;
+mod conversions;
 mod design;
 mod displacement;
 mod dual;
@@ -65,6 +66,7 @@ mod error;
 mod estimate;
 mod exploration;
 mod families;
+mod labelling;
 mod leftovers;
 mod measure;
 mod paper;
@@ -76,6 +78,7 @@ mod simplification;
 mod structuring_set;
 mod tight;
 mod wavefront;
+
 pub use contact::{ContactDistribution, MOST_BINS};
 pub use design::{Design, Preset, presets};
 pub use displacement::{Direction, Displaced, Offset, Profile, displace, vertex_normals, vertex_values};

@@ -1,7 +1,4 @@
 //! Reconstruction to the letter of section 4.4 of the paper.
-#![allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
-
-use std::ops::ControlFlow;
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -9,11 +6,12 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::bounds::{Limit, Region};
 use crate::budget::Levels;
+use crate::conversions::index;
 use crate::dual::DualGraph;
 use crate::error::MicrogeometryError;
+use crate::labelling::{Labelling, signed};
 use crate::leftovers::average;
-use crate::reconstruction::Labelling;
-use crate::tight::signed;
+use stereology_metrics::Progress;
 
 pub(crate) struct Paper<'a> {
     pub(crate) graph: &'a DualGraph,
@@ -22,7 +20,7 @@ pub(crate) struct Paper<'a> {
     pub(crate) unit: i64,
     pub(crate) bin: f64,
     pub(crate) seed: u64,
-    pub(crate) progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+    pub(crate) progress: Progress<'a>,
 }
 
 impl Paper<'_> {
@@ -43,7 +41,7 @@ impl Paper<'_> {
         let mut labelled = vec![false; count];
         let mut labels = vec![0.0; count];
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut open: Vec<u32> = (0..count as u32).collect();
+        let mut open: Vec<u32> = (0..index(count)).collect();
         for level in (0..levels).rev() {
             if (self.progress)(1.0 - (level + 1) as f64 / levels as f64).is_break() {
                 return Err(MicrogeometryError::Cancelled);

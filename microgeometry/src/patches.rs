@@ -1,6 +1,6 @@
 //! A graph of patches in place of triangles: where regions lie can be found on it before the mesh is asked.
-#![allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
 
+use crate::conversions::index;
 use crate::dual::{DualGraph, rounded_down};
 use crate::leftovers::bounds;
 use crate::wavefront::Wavefront;
@@ -28,10 +28,10 @@ impl Patches {
             if reached[t] < f64::INFINITY {
                 continue;
             }
-            centres.push(t as u32);
+            centres.push(index(t));
             reached[t] = 0.0;
             front.restart(0.0);
-            front.push(0.0, t as u32);
+            front.push(0.0, index(t));
             while let Some((value, s)) = front.pop() {
                 if -value > reached[s as usize] {
                     continue;
@@ -51,7 +51,7 @@ impl Patches {
         front.restart(0.0);
         for (number, &t) in centres.iter().enumerate() {
             distance[t as usize] = 0.0;
-            patch[t as usize] = number as u32;
+            patch[t as usize] = index(number);
             front.push(0.0, t);
         }
         while let Some((value, s)) = front.pop() {

@@ -9,11 +9,13 @@ use crate::budget::{UNIT, area_weights, levels};
 use crate::contact::ContactDistribution;
 use crate::dual::{Adjacency, DualGraph, Metric};
 use crate::error::MicrogeometryError;
+use crate::labelling::Labelling;
 use crate::measure::{distribution_of, interface_distances, violations};
 use crate::paper::Paper;
 use crate::patches::Patches;
 use crate::relaxation::{Moves, relaxed};
 use crate::tight::{Shore, Tight};
+use stereology_metrics::Progress;
 
 /// How labels are given to triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -145,12 +147,6 @@ pub struct Shortfall {
     pub got: f64,
 }
 
-/// What a method gives.
-pub(crate) struct Labelling {
-    pub(crate) labels: Vec<f64>,
-    pub(crate) left_over: f64,
-}
-
 /// Shortfalls smaller than this share of the surface are not told.
 const TOLD: f64 = 1e-4;
 
@@ -180,7 +176,7 @@ pub fn reconstruct(
     mesh: &TriangleMesh,
     of: &ContactDistribution,
     options: &ReconstructOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Reconstruction, MicrogeometryError> {
     let paper = options.method == Method::Paper;
     let adjacency = options
@@ -231,7 +227,7 @@ fn tight(
     weights: &[i64],
     weighting: Weighting,
     seed: u64,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Labelling, MicrogeometryError> {
     let bin = of.bin_width();
     let total = weights.iter().sum();
@@ -275,7 +271,7 @@ fn tight(
     label(graph, weights, Some(shore), [0.5, 1.0])
 }
 
-fn progress_to(progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync), done: f64) -> Result<(), MicrogeometryError> {
+fn progress_to(progress: Progress<'_>, done: f64) -> Result<(), MicrogeometryError> {
     match progress(done) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(MicrogeometryError::Cancelled),

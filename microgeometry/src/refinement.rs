@@ -1,14 +1,11 @@
 //! Meshes made fine enough to carry the relief (section 4.4: split triangles until the mesh is fine enough).
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "more triangles than 32 bits number are refused before"
-)]
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 use stereology_shape::{Subdivision, TriangleMesh};
 
+use crate::conversions::index;
 use crate::error::MicrogeometryError;
 
 /// More triangles than this are refused.
@@ -109,7 +106,7 @@ impl Edges {
         let mut upper = vec![(0_u32, 0_u32); 3 * mesh.triangles.len()];
         for (side, [a, b]) in sides().enumerate() {
             let place = &mut next[a.min(b) as usize];
-            upper[*place as usize] = (a.max(b), side as u32);
+            upper[*place as usize] = (a.max(b), index(side));
             *place += 1;
         }
         let mut made = Self {
@@ -121,9 +118,9 @@ impl Edges {
             of_vertex.sort_unstable();
             for same in of_vertex.chunk_by(|a, b| a.0 == b.0) {
                 for &(_, side) in same {
-                    made.of_side[side as usize] = made.ends.len() as u32;
+                    made.of_side[side as usize] = index(made.ends.len());
                 }
-                made.ends.push([from as u32, same[0].0]);
+                made.ends.push([index(from), same[0].0]);
             }
         }
         made
@@ -158,7 +155,7 @@ fn split(mesh: &TriangleMesh, edges: &Edges, chosen: &[bool], smooth: bool) -> T
             Some(([c, d], 2)) => 0.375 * (at(from) + at(to)) + 0.125 * (at(*c) + at(*d)),
             _ => 0.5 * (at(from) + at(to)),
         };
-        middles[number] = vertices.len() as u32;
+        middles[number] = index(vertices.len());
         vertices.push(Point3::from(middle));
     }
     let mut triangles = Vec::with_capacity(mesh.triangles.len() + 2 * (vertices.len() - mesh.vertices.len()));

@@ -8,12 +8,12 @@
 //! ```
 //!
 //! A motion by v changes all distances with foot p by −v, so this is the steepest descent of Σ (x − y)² (the square of Wasserstein's distance), with steps of the size that would do if all these points agreed. Where the middle of a region lies much too far from the interface, an island of the other region is put there.
-#![allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::contact::ContactDistribution;
+use crate::conversions::{index, whole_part};
 use crate::dual::DualGraph;
 use crate::wavefront::Wavefront;
 
@@ -43,10 +43,10 @@ impl Feet {
                 .filter(|link| positive[link.to as usize] != positive[t]);
             let near = other.map(|link| 0.5 * link.length()).fold(f64::INFINITY, f64::min);
             if near.is_finite() {
-                made.shore.push(t as u32);
+                made.shore.push(index(t));
                 made.distance[t] = near;
-                made.foot[t] = t as u32;
-                front.push(-near, t as u32);
+                made.foot[t] = index(t);
+                front.push(-near, index(t));
             }
         }
         while let Some((value, t)) = front.pop() {
@@ -92,14 +92,14 @@ impl Quantiles {
         let (low, high) = finite().fold((0.0_f64, 0.0_f64), |(l, h), (x, _)| (l.min(*x), h.max(*x)));
         let per_unit = (CELLS / of.bin_width()).min(MOST_CELLS / (high - low));
         let (below, above) = (
-            (-low * per_unit).ceil() as usize + 1,
-            (high * per_unit).ceil() as usize + 1,
+            whole_part((-low * per_unit).ceil()) + 1,
+            whole_part((high * per_unit).ceil()) + 1,
         );
         let mut shares = vec![0.0; below + above];
         let first = -(below as f64);
         let mut total = 0.0;
         for (x, &weight) in finite() {
-            shares[(x * per_unit - first) as usize] += weight as f64;
+            shares[whole_part(x * per_unit - first)] += weight as f64;
             total += weight as f64;
         }
         // The distribution asked for, from its lowest bin to its highest.
@@ -142,7 +142,7 @@ impl Quantiles {
 
     fn of(&self, x: f64) -> f64 {
         let place = (x * self.per_unit - self.first).clamp(0.0, self.at.len() as f64 - 1.001);
-        let cell = place as usize;
+        let cell = whole_part(place);
         self.at[cell] + (self.at[cell + 1] - self.at[cell]) * (place - cell as f64)
     }
 }
@@ -246,13 +246,13 @@ fn islands(graph: &DualGraph, feet: &Feet, wanted: &Quantiles, bin: f64, positiv
         }
         let highest = graph.links(t).iter().all(|link| {
             let y = feet.distance[link.to as usize];
-            y.abs() < x.abs() || (y.abs() <= x.abs() && link.to > t as u32)
+            y.abs() < x.abs() || (y.abs() <= x.abs() && link.to > index(t))
         });
         if !highest {
             continue;
         }
         near.clear();
-        near.push(t as u32);
+        near.push(index(t));
         near.extend(graph.links(t).iter().map(|link| link.to));
         for &s in &near {
             positive[s as usize] = x < 0.0;

@@ -1,11 +1,12 @@
 //! Fewer triangles where the relief is flat (section 4.4: adaptively reduce the resolution of the final mesh).
-#![allow(clippy::cast_possible_truncation, reason = "meshes number their vertices in 32 bits")]
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use stereology_shape::TriangleMesh;
+
+use crate::conversions::index;
 
 /// Borders are kept as if planes of so many times their weight stood on them.
 const BORDER: f64 = 100.0;
@@ -128,9 +129,9 @@ impl Collapse {
                 t.iter().for_each(|&v| quadrics[v as usize].add(&plane));
             }
             for k in 0..3 {
-                around[t[k] as usize].push(number as u32);
+                around[t[k] as usize].push(index(number));
                 let (from, to) = (t[k], t[(k + 1) % 3]);
-                sides.push((from.min(to), from.max(to), number as u32));
+                sides.push((from.min(to), from.max(to), index(number)));
             }
         }
         sides.sort_unstable();
@@ -299,7 +300,7 @@ impl Collapse {
                 t.map(|v| {
                     let known = &mut number[v as usize];
                     if *known == u32::MAX {
-                        *known = vertices.len() as u32;
+                        *known = index(vertices.len());
                         vertices.push(self.points[v as usize] + self.origin);
                         values.push(self.values[v as usize]);
                     }

@@ -1,13 +1,10 @@
 //! Contact distributions of eq. (1) with other sets than discs.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "distances in pixels of a picture in memory"
-)]
 
 use std::f64::consts::{PI, TAU};
 
 use ndarray::ArrayView2;
 
+use crate::conversions::whole_part;
 use crate::error::MicrogeometryError;
 
 /// The set B that grows until it touches, about the origin (section 3.2).
@@ -67,7 +64,7 @@ impl StructuringSet {
                 let n = radii.len();
                 let step = TAU / n as f64;
                 let place = y.atan2(x).rem_euclid(TAU) / step;
-                let k = (place as usize).min(n - 1);
+                let k = (whole_part(place)).min(n - 1);
                 let corner = |i: usize| {
                     let (sin, cos) = (i as f64 * step).sin_cos();
                     (radii[i % n] * cos, radii[i % n] * sin)
@@ -102,7 +99,7 @@ impl StructuringSet {
             Self::Disc | Self::Square => 1.0,
             Self::Star(of) => of.iter().fold(0.0_f64, |most, r| most.max(*r)),
         };
-        let margin = (reach * radii as f64).ceil() as isize;
+        let margin = whole_part((reach * radii as f64).ceil()).cast_signed();
         let mut steps: Vec<(f64, isize, isize)> = (-margin..=margin)
             .flat_map(|dy| (-margin..=margin).map(move |dx| (dy, dx)))
             .map(|(dy, dx)| (self.gauge(dx as f64, dy as f64), dy, dx))
@@ -120,7 +117,7 @@ impl StructuringSet {
                 asked += 1;
                 let at = |dy: isize, dx: isize| picture[[y.wrapping_add_signed(dy), x.wrapping_add_signed(dx)]];
                 if let Some((r, ..)) = steps.iter().find(|&&(_, dy, dx)| at(dy, dx)) {
-                    hits[(r - 1e-9).ceil().max(0.0) as usize] += 1;
+                    hits[whole_part((r - 1e-9).ceil())] += 1;
                 }
             }
         }
@@ -176,7 +173,7 @@ mod tests {
                     .flat_map(|dy| (-13..=13).map(move |dx| (dy, dx)))
                     .filter(|&(dy, dx)| inside(dy, dx))
                     .count();
-                let expected = 1.0 - (1.0 - share).powi(pixels as i32 - 1);
+                let expected = 1.0 - (1.0 - share).powf(pixels as f64 - 1.0);
                 // Neighbouring pixels see the same points: about one independent answer for each |2rB|.
                 let answers = (n * n) as f64 / (4.0 * pixels as f64);
                 let spread = (expected * (1.0 - expected) / answers).sqrt();

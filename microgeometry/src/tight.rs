@@ -1,5 +1,4 @@
 //! Reconstruction that looks ahead and packs tightly: the default.
-#![allow(clippy::cast_possible_truncation, reason = "triangles are numbered in 32 bits")]
 
 use std::ops::ControlFlow;
 
@@ -9,10 +8,12 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::bounds::{Limit, Region};
 use crate::budget::{Levels, take_share};
+use crate::conversions::single;
 use crate::dual::{DualGraph, Link};
 use crate::error::MicrogeometryError;
+use crate::labelling::{Labelling, signed};
 use crate::leftovers::bounds;
-use crate::reconstruction::Labelling;
+use stereology_metrics::Progress;
 
 /// Refusals in a row after which no seed farther from its region is tried.
 const REFUSALS: u32 = 32;
@@ -36,7 +37,7 @@ pub(crate) struct Tight<'a> {
     pub(crate) seed: u64,
     /// The interface, if it is given.
     pub(crate) shore: Option<Shore<'a>>,
-    pub(crate) progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+    pub(crate) progress: Progress<'a>,
 }
 
 /// A given interface: labels get the signs of these distances to it.
@@ -165,7 +166,7 @@ impl Tight<'_> {
         dice: &[f32],
     ) {
         let value = level as f64 * self.height;
-        let turn = ((2 * level + side) as f64 * 0.618_033_988_749_894_9).fract() as f32;
+        let turn = single(((2 * level + side) as f64 * 0.618_033_988_749_894_9).fract());
         let mut candidates: Vec<u64> = Vec::new();
         for &t in open {
             let i = t as usize;
@@ -400,18 +401,14 @@ fn to_the_other_region(graph: &DualGraph, distance: &[f64]) -> Vec<f64> {
     graph.distances(&shore.collect::<Vec<_>>())
 }
 
-/// A value of a region as a label, or back.
-pub(crate) fn signed(side: usize, value: f64) -> f64 {
-    if side == 1 { value } else { -value }
-}
-
 /// A candidate: its cost, which is not negative, before its number, so that whole numbers sort as both do.
 fn key(cost: f64, t: u32) -> u64 {
-    u64::from((cost as f32).to_bits()) << 32 | u64::from(t)
+    u64::from(single(cost).to_bits()) << 32 | u64::from(t)
 }
 
 fn triangle(candidate: u64) -> u32 {
-    candidate as u32
+    // The lower half.
+    u32::try_from(candidate & u64::from(u32::MAX)).unwrap_or(u32::MAX)
 }
 
 /// Sorts the next candidates behind the first `sorted`; returns how many are sorted now.

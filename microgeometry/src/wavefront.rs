@@ -1,9 +1,6 @@
 //! Triangles in the order in which falling values reach them: a queue of buckets.
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "numbers of buckets saturate"
-)]
+
+use crate::conversions::whole_part;
 
 /// Buckets in reach of the current one; what lies farther waits aside.
 const BUCKETS: usize = 1024;
@@ -54,7 +51,7 @@ impl Wavefront {
 
     pub(crate) fn push(&mut self, value: f64, triangle: u32) {
         // What is above the bucket that is being emptied comes out of it, next.
-        let place = (((self.top - value) * self.per_unit) as usize).max(self.at);
+        let place = whole_part((self.top - value) * self.per_unit).max(self.at);
         if place < BUCKETS {
             self.buckets[place].push((value, triangle));
             self.last = self.last.max(place);
@@ -96,8 +93,8 @@ mod tests {
         fn values_fall(values in prop::collection::vec(-1e4..0.0_f64, 1..200), width in 1e-3..10.0_f64) {
             let mut front = Wavefront::new(width);
             front.restart(0.0);
-            for (i, &value) in values.iter().enumerate() {
-                front.push(value, i as u32);
+            for (i, &value) in (0..).zip(&values) {
+                front.push(value, i);
             }
             let mut out: Vec<f64> = Vec::new();
             while let Some((value, i)) = front.pop() {

@@ -51,11 +51,7 @@
 //! # Ok::<(), stereology_segment::SegmentError>(())
 //! ```
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "pictures in memory have fewer than 2^32 pixels; colours and distances are rounded to f32 and to 8 bits on purpose"
-)]
-
+mod conversions;
 mod error;
 mod files;
 mod ground;

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use ndarray::Array2;
 use serde_json::{Value, json};
 
+use crate::conversions::whole_part;
 use crate::labels::outline::{Outline, Ring, fill_outlines, outlines};
 
 /// Outlines of the annotations of the picture whose size is (height, width): polygons, or masks coded in runs. Numbers are the annotations' ids if they differ, else from 1.
@@ -183,7 +184,7 @@ pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline], (height, width): 
 
 /// Runs of zeros and ones down the columns.
 fn counts(outline: &Outline, bounds: [f64; 4], (height, width): (usize, usize)) -> Vec<usize> {
-    let [left, top, right, bottom] = bounds.map(|v| v as usize);
+    let [left, top, right, bottom] = bounds.map(whole_part);
     let moved = |ring: &Ring| ring.iter().map(|c| [c[0] - left as f64, c[1] - top as f64]).collect();
     let pieces = outline.pieces.iter().map(|p| p.iter().map(moved).collect()).collect();
     let (box_, _) = fill_outlines(&[Outline { id: 1, pieces }], (bottom - top, right - left));

@@ -6,6 +6,7 @@ use std::io::{self, Cursor, Read, Seek, Write};
 
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
+use crate::conversions::{index, single, whole_part};
 use crate::labels::outline::{Outline, Ring};
 
 /// First bytes of a region.
@@ -144,7 +145,7 @@ fn segments(count: usize, float: &impl Fn(usize) -> Result<f64, String>) -> Resu
     let mut i = 0;
     while i < count {
         let value = |k: usize| float(HEADER + 4 * (i + k));
-        let kind = value(0)? as i64;
+        let kind = whole_part(value(0)?);
         let points = match kind {
             0 | 1 => 1,
             2 => 2,
@@ -204,6 +205,11 @@ pub(crate) fn write<W: Write + Seek>(out: W, outlines: &[Outline]) -> io::Result
     Ok(())
 }
 
+/// A number of the header: corners lie within 32,767 pixels, which is checked before anything is written, and `TRACED` regions have fewer than 2¹⁶ corners.
+fn short(v: f64) -> u16 {
+    u16::try_from(whole_part(v)).unwrap_or(u16::MAX)
+}
+
 fn region(outline: &Outline) -> Vec<u8> {
     let corners = || outline.pieces.iter().flatten().flatten();
     let [left, top, right, bottom] = corners().fold([f64::INFINITY, f64::INFINITY, 0.0, 0.0], |b: [f64; 4], c| {
@@ -214,17 +220,17 @@ fn region(outline: &Outline) -> Vec<u8> {
     bytes[..4].copy_from_slice(MAGIC);
     put(&mut bytes, 4, VERSION);
     for (at, v) in [(8, top), (10, left), (12, bottom), (14, right)] {
-        put(&mut bytes, at, v as u16);
+        put(&mut bytes, at, short(v));
     }
     match outline.pieces.as_slice() {
         [piece] if piece.len() == 1 && piece[0].len() < 1 << 16 => {
             bytes[6] = TRACED;
-            put(&mut bytes, 16, piece[0].len() as u16);
+            put(&mut bytes, 16, short(piece[0].len() as f64));
             for axis in 0..2 {
                 let from = [left, top][axis];
                 piece[0]
                     .iter()
-                    .for_each(|c| bytes.extend(((c[axis] - from) as u16).to_be_bytes()));
+                    .for_each(|c| bytes.extend(short(c[axis] - from).to_be_bytes()));
             }
         }
         pieces => {
@@ -232,11 +238,11 @@ fn region(outline: &Outline) -> Vec<u8> {
             let mut path: Vec<f32> = Vec::new();
             for ring in pieces.iter().flatten() {
                 for (i, c) in ring.iter().enumerate() {
-                    path.extend([if i == 0 { 0.0 } else { 1.0 }, c[0] as f32, c[1] as f32]);
+                    path.extend([if i == 0 { 0.0 } else { 1.0 }, single(c[0]), single(c[1])]);
                 }
                 path.push(4.0);
             }
-            bytes[36..40].copy_from_slice(&(path.len() as u32).to_be_bytes());
+            bytes[36..40].copy_from_slice(&index(path.len()).to_be_bytes());
             path.iter().for_each(|v| bytes.extend(v.to_be_bytes()));
         }
     }

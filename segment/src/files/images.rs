@@ -7,6 +7,7 @@ use ndarray::{Array3, ArrayView3, Axis};
 use stereology_grid::write_atomically;
 use tiff::encoder::{TiffEncoder, colortype};
 
+use crate::conversions::{index, level, single};
 use crate::error::SegmentError;
 use crate::files::label_raster::dimensions;
 use crate::labels::profile::Index;
@@ -30,15 +31,15 @@ impl Segmentation {
     #[must_use]
     pub fn overlay(&self) -> RgbImage {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
-        let index = Index::new(&ids);
+        let places = Index::new(&ids);
         let mut out = self.photo.clone();
         for &[y, x] in self.rejected.iter().filter(|[y, x]| (y + x) % 2 == 0) {
-            out.put_pixel(x as u32, y as u32, Rgb([0; 3]));
+            out.put_pixel(index(x), index(y), Rgb([0; 3]));
         }
         for ((y, x), &label) in self.labels.indexed_iter().filter(|(_, l)| **l != 0) {
             if neighbours4([y, x], self.labels.dim()).any(|q| self.labels[q] != label) {
-                let category = usize::from(self.profiles[index.of(label)].category);
-                out.put_pixel(x as u32, y as u32, Rgb(OUTLINES[category % OUTLINES.len()]));
+                let category = usize::from(self.profiles[places.of(label)].category);
+                out.put_pixel(index(x), index(y), Rgb(OUTLINES[category % OUTLINES.len()]));
             }
         }
         out
@@ -47,7 +48,7 @@ impl Segmentation {
     /// The photo's binder, its colour in place of the profiles.
     #[must_use]
     pub fn binder_picture(&self) -> RgbImage {
-        let colour = Rgb(encoded(self.binder.colour));
+        let colour = Rgb(self.binder.colour.map(level));
         let mut out = self.photo.clone();
         for (pixel, _) in out.pixels_mut().zip(&self.labels).filter(|(_, l)| **l != 0) {
             *pixel = colour;
@@ -59,12 +60,12 @@ impl Segmentation {
     #[must_use]
     pub fn means(&self) -> RgbImage {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
-        let index = Index::new(&ids);
-        let colours: Vec<Rgb<u8>> = self.profiles.iter().map(|p| Rgb(encoded(p.colour))).collect();
-        let binder = Rgb(encoded(self.binder.colour));
+        let places = Index::new(&ids);
+        let colours: Vec<Rgb<u8>> = self.profiles.iter().map(|p| Rgb(p.colour.map(level))).collect();
+        let binder = Rgb(self.binder.colour.map(level));
         let mut out = self.photo.clone();
         for (pixel, &label) in out.pixels_mut().zip(&self.labels) {
-            *pixel = if label == 0 { binder } else { colours[index.of(label)] };
+            *pixel = if label == 0 { binder } else { colours[places.of(label)] };
         }
         out
     }
@@ -94,7 +95,7 @@ impl Segmentation {
     #[must_use]
     pub fn residual(&self) -> Array3<f32> {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
-        let index = Index::new(&ids);
+        let places = Index::new(&ids);
         let mut out = Array3::zeros((self.window.height, self.window.width, 3));
         for ((mut r, p), &label) in out
             .lanes_mut(Axis(2))
@@ -105,10 +106,10 @@ impl Segmentation {
             let mean = if label == 0 {
                 self.binder.colour
             } else {
-                self.profiles[index.of(label)].colour
+                self.profiles[places.of(label)].colour
             };
             for c in 0..3 {
-                r[c] = (f64::from(p[c]) / 255.0 - mean[c]) as f32;
+                r[c] = single(f64::from(p[c]) / 255.0 - mean[c]);
             }
         }
         out
@@ -117,12 +118,12 @@ impl Segmentation {
     /// The residual laid over the binder's colour: what the stone looks like with every particle dyed.
     #[must_use]
     pub fn residual_picture(&self) -> RgbImage {
-        let binder = encoded(self.binder.colour);
+        let binder = self.binder.colour.map(level);
         let mut out = self.means();
         for (mean, pixel) in out.pixels_mut().zip(self.photo.pixels()) {
             for c in 0..3 {
-                let level = i16::from(pixel[c]) - i16::from(mean[c]) + i16::from(binder[c]);
-                mean[c] = level.clamp(0, 255) as u8;
+                let shifted = i16::from(pixel[c]) - i16::from(mean[c]) + i16::from(binder[c]);
+                mean[c] = u8::try_from(shifted.clamp(0, 255)).unwrap_or(255);
             }
         }
         out
@@ -142,11 +143,6 @@ impl Segmentation {
     pub fn photo(&self) -> &RgbImage {
         &self.photo
     }
-}
-
-/// Colour of encoded values 0 to 1, rounded to 8 bits.
-fn encoded(colour: [f64; 3]) -> [u8; 3] {
-    colour.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
 fn write_float_tiff(path: impl AsRef<Path>, picture: ArrayView3<'_, f32>) -> Result<(), SegmentError> {

@@ -15,6 +15,8 @@ use tiff::{
 
 use stereology_metrics::Finding;
 
+use crate::conversions::{index, whole_part};
+
 /// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
 const LARGEST_MAP: usize = 1_600_000_000;
 /// Advice for files whose samples are no labels.
@@ -158,10 +160,12 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array2<u32>, String> {
         match (kind.as_bytes()[0], size) {
             (b'b' | b'u', 1 | 2 | 4 | 8) => whole(bits as f64),
             (b'i', 1 | 2 | 4 | 8) => {
-                let unused = 64 - 8 * size as u32;
+                let unused = 64 - 8 * index(size);
                 whole(((bits << unused).cast_signed() >> unused) as f64)
             }
-            (b'f', 4) => whole(f64::from(f32::from_bits(bits as u32))),
+            (b'f', 4) => whole(f64::from(f32::from_le_bytes([
+                little[0], little[1], little[2], little[3],
+            ]))),
             (b'f', 8) => whole(f64::from_bits(bits)),
             _ => Err(format!("numbers of type {order}{kind}; {ADVICE}")),
         }
@@ -186,17 +190,17 @@ fn whole(value: f64) -> Result<u32, String> {
             "the label {value} is no whole number of at most 32 bits; {ADVICE}"
         ));
     }
-    Ok(value as u32)
+    Ok(index(whole_part(value)))
 }
 
 /// Samples of fewer than eight bits, rows beginning on a byte.
 fn unpack(packed: &[u8], columns: usize, bits: u8) -> impl Iterator<Item = u8> {
     let each = usize::from(8 / bits.max(1));
-    let mask = ((1_u16 << bits) - 1) as u8;
+    let mask = u8::MAX >> (8 - bits.clamp(1, 8));
     packed.chunks(columns.div_ceil(each).max(1)).flat_map(move |row| {
         (0..columns).map(move |x| {
             row.get(x / each)
-                .map_or(0, |b| b >> (8 - bits * (x % each + 1) as u8) & mask)
+                .map_or(0, |b| b >> (8 - usize::from(bits) * (x % each + 1)) & mask)
         })
     })
 }
@@ -233,7 +237,7 @@ pub(crate) fn write_npy(out: &mut dyn Write, labels: ArrayView2<'_, u32>) -> std
     text.push_str(&" ".repeat(unpadded.next_multiple_of(64) - unpadded));
     text.push('\n');
     out.write_all(b"\x93NUMPY\x01\x00")?;
-    out.write_all(&(text.len() as u16).to_le_bytes())?;
+    out.write_all(&u16::try_from(text.len()).unwrap_or(u16::MAX).to_le_bytes())?;
     out.write_all(text.as_bytes())?;
     let samples: Vec<u8> = labels.iter().flat_map(|l| l.to_le_bytes()).collect();
     out.write_all(&samples)

@@ -3,6 +3,7 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
+use crate::conversions::single;
 use crate::ground::kmeans::kmeans;
 use crate::ground::light::{
     Sample, Surface, TERMS, colour_at, fit_surface, identity, inverse_factor, place, sample, scatter,
@@ -213,7 +214,7 @@ impl BinderModel {
     /// Colour of the binder at a pixel, light included.
     #[must_use]
     pub fn light(&self, x: usize, y: usize) -> [f32; 3] {
-        self.at(self.place(x, y)).map(|c| c as f32)
+        self.at(self.place(x, y)).map(single)
     }
 
     /// [`light`](Self::light) along a row: what depends on the row alone is worked out once.
@@ -221,7 +222,7 @@ impl BinderModel {
         let [_, v] = self.place(0, y);
         let row = self
             .surface
-            .map(|c| [c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]].map(|c| c as f32));
+            .map(|c| [c[0] + v * (c[2] + v * c[5]), c[1] + v * c[4], c[3]].map(single));
         let width = self.size.1 as f32;
         move |x| {
             let u = (2 * x + 1) as f32 / width - 1.0;
@@ -238,7 +239,7 @@ impl BinderModel {
     #[must_use]
     pub fn even_light(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
         // Means of u² and v² over −1..1 are a third, of the other terms zero.
-        let mean = self.surface.map(|c| (c[0] + (c[3] + c[5]) / 3.0) as f32);
+        let mean = self.surface.map(|c| single(c[0] + (c[3] + c[5]) / 3.0));
         let mut out = picture.clone();
         out.axis_iter_mut(Axis(0))
             .into_par_iter()
@@ -269,7 +270,7 @@ impl BinderModel {
     #[must_use]
     pub fn deviation(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
         let mut out = picture.clone();
-        let w = self.whitening.map(|row| row.map(|v| v as f32));
+        let w = self.whitening.map(|row| row.map(single));
         out.axis_iter_mut(Axis(0))
             .into_par_iter()
             .enumerate()

@@ -3,6 +3,7 @@
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
 
+use crate::conversions::whole_part;
 use crate::ground::binder::{BinderModel, length};
 use crate::outlines::half_contrast::half_contrast;
 use crate::outlines::regions::{hysteresis, neighbours8, open};
@@ -125,7 +126,7 @@ fn enlarged(field: &Array2<[f32; 3]>, dim: (usize, usize)) -> Array2<[f32; 3]> {
     let (rows, columns) = field.dim();
     let between = |i: usize, n: usize| {
         let at = ((i as f32 + 0.5) / CELL as f32 - 0.5).clamp(0.0, (n - 1) as f32);
-        let low = (at as usize).min(n.saturating_sub(2));
+        let low = whole_part(f64::from(at)).min(n.saturating_sub(2));
         (low, (low + 1).min(n - 1), at - low as f32)
     };
     Array2::from_shape_fn(dim, |(y, x)| {

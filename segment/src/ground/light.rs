@@ -2,6 +2,8 @@
 
 use ndarray::Array2;
 
+use crate::conversions::whole_part;
+
 /// Terms of a quadratic surface.
 pub(crate) const TERMS: usize = 6;
 
@@ -23,7 +25,7 @@ pub(crate) struct Sample {
 /// Pixels on a square lattice.
 pub(crate) fn sample(picture: &Array2<[f32; 3]>) -> Vec<Sample> {
     let (height, width) = picture.dim();
-    let step = ((height * width / SAMPLE) as f64).sqrt().floor().max(1.0) as usize;
+    let step = whole_part(((height * width / SAMPLE) as f64).sqrt()).max(1);
     let at = |n: usize| (step / 2..n).step_by(step);
     at(height)
         .flat_map(|y| at(width).map(move |x| (x, y)))

@@ -4,6 +4,7 @@ use image::RgbImage;
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter_rgb};
 
+use crate::conversions::single;
 use crate::error::SegmentError;
 use crate::files::photo::encoded_image;
 use crate::ground::binder::{BinderModel, length};
@@ -64,7 +65,7 @@ pub(crate) struct Seen {
 pub(crate) fn chosen_binder(colours: &Array2<[f32; 3]>, options: &SegmentOptions) -> Result<BinderModel, SegmentError> {
     match options.binder {
         BinderChoice::Found => Ok(BinderModel::fit(colours, options.seed)),
-        BinderChoice::Colour(colour) => Ok(BinderModel::fit_near(colours, colour.map(rounded))),
+        BinderChoice::Colour(colour) => Ok(BinderModel::fit_near(colours, colour.map(single))),
         BinderChoice::MainColour(number) => {
             let main = main_colours(colours, options.seed);
             let (colour, _) = main.get(number).ok_or(SegmentError::Option {
@@ -75,11 +76,6 @@ pub(crate) fn chosen_binder(colours: &Array2<[f32; 3]>, options: &SegmentOptions
             Ok(BinderModel::fit_near(colours, *colour))
         }
     }
-}
-
-#[allow(clippy::cast_possible_truncation, reason = "a colour, rounded to f32")]
-fn rounded(channel: f64) -> f32 {
-    channel as f32
 }
 
 impl Seen {

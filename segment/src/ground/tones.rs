@@ -3,6 +3,7 @@
 use ndarray::Array2;
 use stereology_imaging::distance_transform;
 
+use crate::conversions::{single, whole_part};
 use crate::ground::binder::{BinderModel, GUESSES};
 use crate::ground::kmeans::{Clusters, kmeans, squared_distance};
 use crate::ground::light::{Sample, sample};
@@ -72,7 +73,7 @@ impl TwoTones {
     /// Linear in pixels.
     #[must_use]
     pub fn binder(&self, picture: &Array2<[f32; 3]>) -> BinderModel {
-        let [a, b] = self.colours.map(|c| c.map(|v| v as f32));
+        let [a, b] = self.colours.map(|c| c.map(single));
         let near = |p: &[f32; 3], c: &[f32; 3]| (0..3).map(|i| (p[i] - c[i]).powi(2)).sum::<f32>();
         let is_a = picture.map(|p| near(p, &a) <= near(p, &b));
         let thin = usize::from(mean_depth(&is_a) > mean_depth(&is_a.mapv(|m| !m)));
@@ -136,7 +137,7 @@ impl TwoTones {
             let colour = colour.map(f64::from);
             if is_beyond(&colour) {
                 let deviations = own.squared(own.place(x, y), colour).sqrt();
-                *z = z.min((BEYOND * deviations) as f32);
+                *z = z.min(single(BEYOND * deviations));
             }
         }
     }
@@ -159,15 +160,15 @@ pub fn main_colours(picture: &Array2<[f32; 3]>, seed: u64) -> Vec<([f32; 3], f64
     let groups = kmeans(&colours, GUESSES, seed);
     let share = |g: usize| groups.assignment.iter().filter(|a| **a == g).count() as f64 / colours.len() as f64;
     let main = groups.centres.iter().enumerate();
-    main.map(|(g, centre)| (centre.map(|c| c as f32), share(g))).collect()
+    main.map(|(g, centre)| (centre.map(single), share(g))).collect()
 }
 
 /// Colour of the densest spot of a picture's colours: the middle of the fullest cube of eight levels' side.
 pub(crate) fn densest(picture: &Array2<[f32; 3]>) -> [f32; 3] {
     let mut counts = vec![0_u32; 32 * 32 * 32];
-    let level = |v: f32| ((v * 32.0) as usize).min(31);
+    let cube = |v: f32| whole_part(f64::from(v * 32.0)).min(31);
     for s in sample(picture) {
-        let [r, g, b] = s.colour.map(|c| level(c as f32));
+        let [r, g, b] = s.colour.map(|c| cube(single(c)));
         counts[(r * 32 + g) * 32 + b] += 1;
     }
     let fullest = (0..counts.len())

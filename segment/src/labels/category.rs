@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use stereology_imaging::lab;
 
+use crate::conversions::single;
 use crate::ground::kmeans::{Clusters, kmeans, silhouette};
 use crate::labels::profile::Profile;
 use crate::options::CategoryCount;
@@ -51,7 +52,7 @@ const MOST: usize = 8;
 pub fn categorise(profiles: &mut [Profile], count: CategoryCount, seed: u64) -> Vec<Category> {
     let colours: Vec<[f64; 3]> = profiles
         .iter()
-        .map(|p| lab(p.colour.map(|c| c as f32)).map(f64::from))
+        .map(|p| lab(p.colour.map(single)).map(f64::from))
         .collect();
     let clusters = match count {
         CategoryCount::Given(k) => kmeans(&colours, k.min(255), seed),
@@ -60,7 +61,7 @@ pub fn categorise(profiles: &mut [Profile], count: CategoryCount, seed: u64) -> 
     };
     let mut sums = vec![([0.0; 3], 0.0, 0_usize); clusters.centres.len()];
     for (p, &group) in profiles.iter_mut().zip(&clusters.assignment) {
-        p.category = group as u8; // at most 255 groups
+        p.category = u8::try_from(group).unwrap_or(u8::MAX); // at most 255 groups
         let s = &mut sums[group];
         (0..3).for_each(|c| s.0[c] += p.colour[c] * p.area);
         s.1 += p.area;

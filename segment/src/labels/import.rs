@@ -5,6 +5,7 @@ use ndarray::Array2;
 use stereology_imaging::connected_components;
 
 use crate::error::SegmentError;
+use crate::files::photo::{MOST_PIXELS, too_large};
 use crate::labels::profile::distinct;
 use crate::options::SegmentOptions;
 use crate::outlines::regions::neighbours4;
@@ -47,6 +48,9 @@ impl Segmentation {
                 labels: [width, height],
                 photo: size,
             });
+        }
+        if labels.len() as u64 > MOST_PIXELS {
+            return Err(too_large([photo.width(), photo.height()], MOST_PIXELS));
         }
         let largest = labels.iter().copied().max().unwrap_or(0);
         let (pieces, count) = connected_components(labels.view(), |l| l != 0);

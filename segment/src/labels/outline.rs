@@ -3,6 +3,8 @@
 use ndarray::Array2;
 use stereology_imaging::connected_components;
 
+use crate::conversions::whole_part;
+
 /// Corners of a closed line, (x, y) in pixels from the photo's upper left corner, the first not repeated at the end.
 pub type Ring = Vec<[f64; 2]>;
 
@@ -139,7 +141,7 @@ pub fn fill_outlines(outlines: &[Outline], (height, width): (usize, usize)) -> (
         for piece in &outline.pieces {
             for (y, crossings) in crossings(piece, height) {
                 for pair in crossings.chunks_exact(2) {
-                    let pixel = |at: f64| (at - 0.5).ceil().clamp(0.0, width as f64) as usize;
+                    let pixel = |at: f64| whole_part((at - 0.5).ceil()).min(width);
                     for x in pixel(pair[0])..pixel(pair[1]) {
                         let label: &mut u32 = &mut labels[[y, x]];
                         overlap += usize::from(*label != 0 && *label != outline.id);
@@ -159,7 +161,7 @@ fn crossings(rings: &[Ring], height: usize) -> Vec<(usize, Vec<f64>)> {
         for (i, a) in ring.iter().enumerate() {
             let b = ring[(i + 1) % ring.len()];
             let (top, bottom) = if a[1] < b[1] { (*a, b) } else { (b, *a) };
-            let row = |at: f64| (at - 0.5).ceil().clamp(0.0, height as f64) as usize;
+            let row = |at: f64| whole_part((at - 0.5).ceil()).min(height);
             for y in row(top[1])..row(bottom[1]) {
                 let share = (y as f64 + 0.5 - top[1]) / (bottom[1] - top[1]);
                 all.push((y, top[0] + share * (bottom[0] - top[0])));

@@ -3,6 +3,7 @@
 use ndarray::Array2;
 use stereology_imaging::{DisjointSets, connected_components, distance_transform, gaussian_filter};
 
+use crate::conversions::{index, single};
 use crate::ground::kmeans::kmeans;
 use crate::labels::watershed::Basins;
 use crate::outlines::cores::{CORE_DEPTH, Cores};
@@ -84,7 +85,7 @@ pub fn split_by_colour(lab: &Array2<[f32; 3]>, mask: &Array2<bool>, seed: u64) -
         .map(|(c, _)| c.map(f64::from))
         .collect();
     let centres = kmeans(&sample, GROUPS, seed).centres;
-    let centres: Vec<[f32; 3]> = centres.into_iter().map(|c| c.map(|v| v as f32)).collect();
+    let centres: Vec<[f32; 3]> = centres.into_iter().map(|c| c.map(single)).collect();
     let group = |(c, _): &([f32; 3], f32)| {
         let (mut best, mut least) = (0, f32::INFINITY);
         for (number, centre) in (1..).zip(&centres) {
@@ -156,7 +157,7 @@ fn gathered(mut borders: Vec<Border>) -> Vec<Border> {
 
 /// Joins touching parts, the most alike first, until all that touch differ; the surviving number of each part.
 fn merge(mut known: Vec<Part>, mut borders: Vec<Border>) -> Vec<u32> {
-    let mut sets = DisjointSets::new(known.len() as u32);
+    let mut sets = DisjointSets::new(index(known.len()));
     let mut joined = true;
     while joined {
         joined = false;
@@ -189,7 +190,7 @@ fn merge(mut known: Vec<Part>, mut borders: Vec<Border>) -> Vec<u32> {
         borders.retain(|((a, b), _)| a != b);
         borders = gathered(borders);
     }
-    (0..known.len() as u32).map(|i| sets.root(i)).collect()
+    (0..index(known.len())).map(|i| sets.root(i)).collect()
 }
 
 /// How little two touching parts belong together; `None` if they are two particles.

@@ -5,6 +5,8 @@ use std::cmp::Reverse;
 use ndarray::Array2;
 use stereology_imaging::DisjointSets;
 
+use crate::conversions::{index, whole_part};
+
 /// Steps of height that saddles are sorted by.
 const STEPS: f32 = 64.0;
 /// No pixel.
@@ -53,7 +55,7 @@ impl Basins {
                         }
                     }
                 }
-                up[i] = best as u32;
+                up[i] = index(best);
             }
         }
         let mut tops = Vec::new();
@@ -69,8 +71,8 @@ impl Basins {
                 i = up[i] as usize;
             }
             if of[i] == NONE {
-                of[i] = tops.len() as u32;
-                tops.push((i as u32, heights[i]));
+                of[i] = index(tops.len());
+                tops.push((index(i), heights[i]));
             }
             let hill = of[i];
             path.drain(..).for_each(|p| of[p] = hill);
@@ -121,7 +123,7 @@ impl Basins {
             let (pixel, height) = self.tops[hill as usize];
             (height, Reverse(pixel))
         };
-        let mut sets = DisjointSets::new(self.tops.len() as u32);
+        let mut sets = DisjointSets::new(index(self.tops.len()));
         let mut ended = vec![false; self.tops.len()];
         for &(saddle, a, b) in &self.saddles {
             let (a, b) = (sets.root(a), sets.root(b));
@@ -134,7 +136,7 @@ impl Basins {
             ended[low as usize] = height - saddle < h(self.place(pixel), height);
             sets.join(high, low);
         }
-        let mut standing: Vec<u32> = (0..self.tops.len() as u32).filter(|&i| !ended[i as usize]).collect();
+        let mut standing: Vec<u32> = (0..index(self.tops.len())).filter(|&i| !ended[i as usize]).collect();
         standing.sort_by(|&a, &b| {
             let ((p, height), (q, other)) = (self.tops[a as usize], self.tops[b as usize]);
             other.total_cmp(&height).then(p.cmp(&q))
@@ -150,7 +152,7 @@ impl Basins {
 
     /// That number, for each hill.
     fn named(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
-        let mut sets = DisjointSets::new(self.tops.len() as u32);
+        let mut sets = DisjointSets::new(index(self.tops.len()));
         let mut label = vec![0_u32; self.tops.len()];
         numbers.into_iter().for_each(|(hill, n)| label[hill as usize] = n);
         for &(_, a, b) in &self.saddles {
@@ -161,7 +163,7 @@ impl Basins {
                 label[a as usize] = first.max(second);
             }
         }
-        (0..self.tops.len() as u32)
+        (0..index(self.tops.len()))
             .map(|i| label[sets.root(i) as usize])
             .collect()
     }
@@ -188,7 +190,7 @@ impl Basins {
 
 /// Counting sort by height in steps, ties in order.
 fn highest_first(saddles: &[(f32, u32, u32)]) -> Vec<(f32, u32, u32)> {
-    let step = |s: &(f32, u32, u32)| (s.0.clamp(0.0, 16_000.0) * STEPS) as usize;
+    let step = |s: &(f32, u32, u32)| whole_part(f64::from(s.0.clamp(0.0, 16_000.0) * STEPS));
     let top = saddles.iter().map(step).max().unwrap_or(0);
     let mut starts = vec![0_usize; top + 2];
     saddles.iter().for_each(|s| starts[top - step(s) + 1] += 1);
@@ -275,15 +277,15 @@ mod tests {
         let width = field.dim().1;
         let at = |i: u32| [i as usize / width, i as usize % width];
         let height = |i: u32| field[at(i)];
-        let mut order: Vec<u32> = (0..field.len() as u32).filter(|&i| height(i) > 0.0).collect();
+        let mut order: Vec<u32> = (0..index(field.len())).filter(|&i| height(i) > 0.0).collect();
         order.sort_by(|&a, &b| height(b).total_cmp(&height(a)).then(a.cmp(&b)));
-        let mut sets = DisjointSets::new(field.len() as u32);
+        let mut sets = DisjointSets::new(index(field.len()));
         let mut reached = vec![false; field.len()];
         let mut ended = vec![false; field.len()];
         for &i in &order {
             reached[i as usize] = true;
             for q in neighbours8(at(i), field.dim()) {
-                let q = (q[0] * width + q[1]) as u32;
+                let q = index(q[0] * width + q[1]);
                 if !reached[q as usize] {
                     continue;
                 }

@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use ndarray::Array2;
 use stereology_imaging::{connected_components, distance_transform};
 
+use crate::conversions::{index, whole_part};
+
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 pub(crate) const CORE_DEPTH: f32 = 3.0;
 /// The same for small regions, as a share of the greatest depth within three pixels.
@@ -58,7 +60,7 @@ impl Cores {
             let l = &mut largest[piece as usize];
             *l = l.max(d);
         }
-        let mut core = highest_around(&depth, core_depth as usize);
+        let mut core = highest_around(&depth, whole_part(f64::from(core_depth)));
         core.zip_mut_with(&depth, |c, &d| {
             *c = f32::from(u8::from(d > 0.0 && (d >= core_depth || d >= CORE_SHARE * *c)));
         });
@@ -67,7 +69,7 @@ impl Cores {
         let mut means = RowMeans::new(deviation, &core);
         for y in 0..height {
             means.at_row(y, |x, colour| {
-                source[[y, x]] = known.len() as u32;
+                source[[y, x]] = index(known.len());
                 known.push((colour, largest[pieces[[y, x]] as usize]));
             });
         }
@@ -101,7 +103,7 @@ impl Cores {
                         || bare(x + 1 < width, i + 1)
                         || bare(i + width < pixels, i + width))
                 {
-                    queue.push_back((i as u32, x as u32, 0_u8));
+                    queue.push_back((index(i), index(x), 0_u8));
                 }
             }
         }
@@ -113,7 +115,7 @@ impl Cores {
                     let steps = if mask[q] { 0 } else { outside + 1 };
                     if steps <= reach {
                         source[q] = from;
-                        queue.push_back((q as u32, x as u32, steps));
+                        queue.push_back((index(q), index(x), steps));
                     }
                 }
             };

@@ -1,5 +1,5 @@
-//! Taking an image of 1024 x 1024 apart and putting it together: target 0.2 s.
-#![allow(missing_docs, reason = "criterion's macro makes a public function")]
+//! Decomposition and reconstruction of an image of 1024 x 1024: target 0.2 s.
+#![allow(missing_docs, reason = "criterion's macro generates a public function")]
 
 use std::hint::black_box;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! A coloured image of 512 x 512 in 5 rounds: target 1.5 processor seconds.
-#![allow(missing_docs, reason = "criterion's macro makes a public function")]
+//! A colour image of 512 x 512 in 5 iterations: target 1.5 processor seconds.
+#![allow(missing_docs, reason = "criterion's macro generates a public function")]
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -17,7 +17,7 @@ fn synthesize_image_512(c: &mut Criterion) {
     let exemplar = Array3::from_shape_fn((128, 128, 3), |(y, x, c)| {
         ((y * y + 31 * x + x * y * (c + 3)) % 101) as f32
     });
-    group.bench_function("512x512_rgb_5_rounds", |b| {
+    group.bench_function("512x512_rgb_5_iterations", |b| {
         b.iter(|| {
             let go = |_| ControlFlow::Continue(());
             let options = TextureOptions::default();

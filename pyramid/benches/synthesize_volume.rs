@@ -1,5 +1,5 @@
-//! One round of a coloured volume of 64 x 64 x 64, each mode; 128 x 128 x 128 takes eight times as long.
-#![allow(missing_docs, reason = "criterion's macro makes a public function")]
+//! One iteration of a colour volume of 64 x 64 x 64 in each mode; 128 x 128 x 128 takes eight times as long.
+#![allow(missing_docs, reason = "criterion's macro generates a public function")]
 
 use std::ops::ControlFlow;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! A volume from an image: how near do its slices come to the image, by mode?
+//! A volume from an image: the power spectrum of its slices compared with that of the image, for each mode.
 //!
 //! `cargo run --release --example solid_speckle`
 #![allow(clippy::print_stdout, reason = "an example prints its result")]
@@ -10,7 +10,7 @@ use stereology_pyramid::{Exemplar, Mode, TextureError, TextureOptions, synthesiz
 use stereology_spectrum::radial_spectrum;
 
 fn main() -> Result<(), TextureError> {
-    // Blobs of light on dark.
+    // Light spots on a dark background.
     let spots: Vec<(usize, usize)> = (0..150).map(|i| (i * 7919 % 64, i * i * 104_729 % 64)).collect();
     let image = Array3::from_shape_fn((64, 64, 1), |(y, x, _)| {
         let wrapped = |a: usize, b: usize| a.abs_diff(b).min(64 - a.abs_diff(b)) as f32;
@@ -20,7 +20,7 @@ fn main() -> Result<(), TextureError> {
             .sum::<f32>()
     });
     let wanted = radial_spectrum(image.index_axis(Axis(2), 0), 8).expect("a finite image");
-    println!("power of slices over power of the image, by frequency (cycles per pixel)");
+    println!("power of slices divided by power of the image, by frequency (cycles per pixel)");
     println!(
         "          {}",
         wanted.frequency[..5]

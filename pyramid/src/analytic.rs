@@ -5,10 +5,11 @@ use stereology_spectrum::{Complex, Real};
 
 use crate::Bands;
 
-/// The complex bands of one image, made by [`SteerablePyramid::build_complex`](crate::SteerablePyramid::build_complex).
+/// The complex bands of one image, computed by
+/// [`SteerablePyramid::build_complex`](crate::SteerablePyramid::build_complex).
 ///
-/// A band's complex coefficients hold the frequencies of one side of its orientation only, twice: their real part is the real
-/// band, their imaginary part its partner a quarter of a wave apart.
+/// The complex coefficients of a band contain the frequencies on one side of its orientation only, doubled: their real
+/// part is the real band, their imaginary part the band in quadrature.
 ///
 /// # Formula
 ///
@@ -51,12 +52,12 @@ impl<T: Real> AnalyticBands<T> {
         &self.real
     }
 
-    /// [`Self::real`], to be changed.
+    /// Mutable [`Self::real`].
     pub fn real_mut(&mut self) -> &mut Bands<T> {
         &mut self.real
     }
 
-    /// Complex band of a level (0 the finest) and an orientation.
+    /// Complex band of a level (0 is the finest) and an orientation.
     ///
     /// # Panics
     ///

@@ -7,19 +7,21 @@ use stereology_spectrum::Real;
 
 use crate::bank::FilterBank;
 
-/// The bands of one image: a high-pass residual, oriented bands by level (0 is the finest), a low-pass residual.
+/// The bands of one image: the high-pass residual, oriented bands by level (0 is the finest), and the low-pass
+/// residual.
 ///
-/// Made by [`SteerablePyramid::build`](crate::SteerablePyramid::build); the `_mut` accessors change coefficients in place.
+/// Computed by [`SteerablePyramid::build`](crate::SteerablePyramid::build); the `_mut` accessors change coefficients in
+/// place.
 #[derive(Clone, Debug)]
 pub struct Bands<T: Real> {
     pub(crate) coefficients: Vec<T>,
     pub(crate) bank: Arc<FilterBank<T>>,
 }
 
-/// Figures of one band, over its own samples.
+/// Statistics of one band, over its own samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandSummary {
-    /// Level, 0 the finest; the high-pass residual is on level 0, the low-pass residual one beyond the last.
+    /// Level, 0 is the finest; the high-pass residual has level 0, the low-pass residual the number of levels.
     pub level: usize,
     /// Orientation `b` of `K`, at angle `π b / K`; `None` for the residual bands.
     pub orientation: Option<usize>,
@@ -34,14 +36,14 @@ pub struct BandSummary {
 }
 
 impl<T: Real> Bands<T> {
-    /// What lies beyond Nyquist, in the corners of the frequency square; full size.
+    /// The high-pass residual: frequencies beyond Nyquist, in the corners of the frequency square; full size.
     #[must_use]
     pub fn high(&self) -> ArrayView2<'_, T> {
         self.band(0, 0)
     }
 
-    /// Band of a level (0 the finest) and an orientation `b` of `K`, sensitive to waves that run along the angle `π b / K`
-    /// from the columns' direction towards the rows'.
+    /// Band of a level (0 is the finest) and an orientation `b` of `K`, sensitive to waves along the angle `π b / K`,
+    /// measured from the x axis (along a row) towards the y axis (along a column).
     ///
     /// # Panics
     ///
@@ -51,18 +53,18 @@ impl<T: Real> Bands<T> {
         self.band(self.index(level, orientation), level)
     }
 
-    /// What is coarser than the last level; its mean is the image's.
+    /// The low-pass residual: coarser than the last level, with the mean of the image.
     #[must_use]
     pub fn low(&self) -> ArrayView2<'_, T> {
         self.band(self.bank.ranges().len() - 1, self.bank.level_count())
     }
 
-    /// [`Self::high`], to be changed.
+    /// Mutable [`Self::high`].
     pub fn high_mut(&mut self) -> ArrayViewMut2<'_, T> {
         self.band_mut(0, 0)
     }
 
-    /// [`Self::oriented`], to be changed.
+    /// Mutable [`Self::oriented`].
     ///
     /// # Panics
     ///
@@ -71,12 +73,12 @@ impl<T: Real> Bands<T> {
         self.band_mut(self.index(level, orientation), level)
     }
 
-    /// [`Self::low`], to be changed.
+    /// Mutable [`Self::low`].
     pub fn low_mut(&mut self) -> ArrayViewMut2<'_, T> {
         self.band_mut(self.bank.ranges().len() - 1, self.bank.level_count())
     }
 
-    /// Figures of every band: high-pass, then level by level, low-pass.
+    /// Statistics of every band: high-pass, then level by level, low-pass.
     ///
     /// # Examples
     ///
@@ -84,7 +86,7 @@ impl<T: Real> Bands<T> {
     /// use ndarray::Array2;
     /// use stereology_pyramid::SteerablePyramid;
     ///
-    /// // A wave along the rows' direction shows in the band of orientation 2 of 4 (a right angle).
+    /// // A wave along y appears in the band of orientation 2 of 4 (a right angle).
     /// let wave = Array2::from_shape_fn((64, 64), |(y, _)| (y as f64 * std::f64::consts::TAU / 8.0).sin());
     /// let bands = SteerablePyramid::new([64, 64], 3, 4)?.build(wave.view())?;
     /// let strongest = bands.summaries().into_iter().max_by(|a, b| a.mean_square.total_cmp(&b.mean_square)).unwrap();
@@ -115,8 +117,8 @@ impl<T: Real> Bands<T> {
             .collect()
     }
 
-    /// The band of a level that an oriented filter at any `angle` (radians, from the columns' direction towards the rows')
-    /// gives: a mixture of the level's bands, exactly. `O(K)` a sample.
+    /// The band of a level for an oriented filter at any `angle` (radians, from the x axis towards the y axis): an
+    /// exact linear combination of the bands of the level. `O(K)` per sample.
     ///
     /// # Formula
     ///
@@ -149,15 +151,15 @@ impl<T: Real> Bands<T> {
         let k = self.bank.orientations();
         let mut sum = Array2::zeros(self.oriented(level, 0).dim());
         for b in 0..k {
-            let apart = angle - std::f64::consts::PI * b as f64 / k as f64;
-            let waves = (0..k).map(|j| ((2.0 * j as f64 + 1.0 - k as f64) * apart).cos());
+            let difference = angle - std::f64::consts::PI * b as f64 / k as f64;
+            let waves = (0..k).map(|j| ((2.0 * j as f64 + 1.0 - k as f64) * difference).cos());
             let weight = T::from_f64_lossy(waves.sum::<f64>() / k as f64);
             sum.zip_mut_with(&self.oriented(level, b), |s, &v| *s = *s + weight * v);
         }
         sum
     }
 
-    /// Multiplies every level by a function of the image's samples over the level's.
+    /// Multiplies every level by a function of the number of samples of the image divided by that of the level.
     pub(crate) fn scale(&mut self, factor: fn(f64) -> f64) {
         let samples = self.bank.ranges()[0].len() as f64;
         for range in self.bank.ranges() {
@@ -178,12 +180,12 @@ impl<T: Real> Bands<T> {
     fn band(&self, band: usize, level: usize) -> ArrayView2<'_, T> {
         let shape = self.bank.shape_at(level);
         let values = &self.coefficients[self.bank.ranges()[band].clone()];
-        ArrayView2::from_shape((shape[0], shape[1]), values).expect("a band has its level's shape")
+        ArrayView2::from_shape((shape[0], shape[1]), values).expect("a band has the shape of its level")
     }
 
     fn band_mut(&mut self, band: usize, level: usize) -> ArrayViewMut2<'_, T> {
         let shape = self.bank.shape_at(level);
         let values = &mut self.coefficients[self.bank.ranges()[band].clone()];
-        ArrayViewMut2::from_shape((shape[0], shape[1]), values).expect("a band has its level's shape")
+        ArrayViewMut2::from_shape((shape[0], shape[1]), values).expect("a band has the shape of its level")
     }
 }

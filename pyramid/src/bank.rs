@@ -1,8 +1,10 @@
-//! The engine of every pyramid here: filters in the frequency domain, a spectrum cropped from level to level.
+//! The filter bank of all pyramids: filters in the frequency domain, and a spectrum that is cropped from level to
+//! level.
 //!
-//! Level `l` takes its oriented bands with `H` at half its Nyquist, then the low-pass `L` at the same cut leaves a spectrum
-//! that fits on a grid of `ceil(n/2)` samples an axis. The frequencies are those of the first grid, from integer bin
-//! numbers, so nothing is lost at odd sizes. Coefficients carry no gain: a constant image has its value in the low-pass.
+//! The oriented bands of level `l` pass `H` with a cutoff at half the Nyquist frequency of the level. The low-pass `L`
+//! with the same cutoff leaves a spectrum for a grid of `ceil(n/2)` samples per axis. Frequencies are those of the
+//! first grid, from integer bin numbers, so nothing is lost at odd sizes. Coefficients have no gain: a constant image
+//! has its value in the low-pass.
 
 use std::ops::Range;
 
@@ -11,7 +13,7 @@ use stereology_spectrum::{Complex, Real, RealFft, Work};
 
 use crate::filters::{Directions, high_pass, low_pass};
 
-/// Arrays of fewer numbers are multiplied on the calling thread.
+/// Smaller arrays are multiplied on the calling thread.
 const PARALLEL_FROM: usize = 1 << 17;
 const BLOCK: usize = 1 << 14;
 
@@ -20,7 +22,7 @@ const BLOCK: usize = 1 << 14;
 pub(crate) struct FilterBank<T: Real> {
     levels: Vec<Level<T>>,
     low: RealFft<T>,
-    /// What lies beyond Nyquist (the corners of the frequency square or cube), and the rest.
+    /// Filters for the frequencies beyond Nyquist (the corners of the frequency square or cube), and for the others.
     high_filter: Vec<T>,
     low_filter: Vec<T>,
     quadrature: bool,
@@ -34,7 +36,7 @@ struct Level<T: Real> {
     low: Vec<T>,
 }
 
-/// Buffers of a bank, kept between calls.
+/// Buffers of a bank, reused between calls.
 #[derive(Clone, Debug)]
 pub(crate) struct BankWork<T: Real> {
     spectra: Vec<Vec<Complex<T>>>,
@@ -42,8 +44,8 @@ pub(crate) struct BankWork<T: Real> {
     work: Vec<Work<T>>,
 }
 
-/// Shape of level `level` of a pyramid of fields of `shape` whose samples lie `spacing` apart along each axis (all alike if
-/// empty): an axis of wider spacing keeps its samples until the level's frequencies leave it fewer.
+/// Shape of level `level` of a pyramid of fields of `shape` with distances `spacing` between samples along each axis
+/// (equal if empty): an axis with wider spacing keeps its samples until the frequencies of the level need fewer.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -60,7 +62,7 @@ pub(crate) fn level_shape(shape: &[usize], spacing: &[f64], level: usize) -> Vec
         .collect()
 }
 
-/// Most levels of a field: the coarsest band still has 8 samples along the shortest axis.
+/// Largest number of levels of a field: the coarsest band has at least 8 samples along the shortest axis.
 pub(crate) fn most_levels(shape: &[usize], spacing: &[f64]) -> usize {
     let fits = |level: usize| level_shape(shape, spacing, level).iter().all(|&n| n >= 8);
     (0..usize::BITS as usize)
@@ -69,7 +71,8 @@ pub(crate) fn most_levels(shape: &[usize], spacing: &[f64]) -> usize {
 }
 
 impl<T: Real> FilterBank<T> {
-    /// `shape` has two or three axes of at least 8; `levels` from 1 to [`most_levels`]; `spacing` one number an axis, or none.
+    /// `shape` has two or three axes of at least 8; `levels` from 1 to [`most_levels`]; `spacing` has one number per
+    /// axis, or is empty.
     pub(crate) fn new(shape: &[usize], spacing: &[f64], levels: usize, directions: &Directions) -> Self {
         let fft_of = |level: usize| {
             RealFft::<T>::new(&level_shape(shape, spacing, level)).expect("two or three axes of at least one sample")
@@ -136,7 +139,8 @@ impl<T: Real> FilterBank<T> {
         self.levels.get(level).map_or(self.low.shape(), |l| l.fft.shape())
     }
 
-    /// Where each band lies among the coefficients: high-pass, then level by level and orientation by orientation, low-pass.
+    /// Range of each band among the coefficients: high-pass, then level by level and orientation by orientation,
+    /// low-pass.
     pub(crate) fn ranges(&self) -> &[Range<usize>] {
         &self.ranges
     }
@@ -225,7 +229,7 @@ impl<T: Real> FilterBank<T> {
             for (filter, range) in level.bands.iter().zip(&self.ranges[1 + l * count..]) {
                 level.fft.forward_into(&coefficients[range.clone()], bins, &mut work[l]);
                 if self.quadrature {
-                    // The conjugate filter: −i where the analysis had i.
+                    // The conjugate filter: −i instead of i.
                     pair(spectrum, bins, filter, |out, v, f| {
                         let f = f * scale;
                         *out = Complex::new(out.re + v.im * f, out.im - v.re * f);
@@ -246,9 +250,11 @@ impl<T: Real> FilterBank<T> {
     }
 }
 
-/// Values of a filter at the bins of a level, given physical frequencies (z, y, x) in cycles per finest spacing and the
-/// radius in units of that spacing's Nyquist. A bin at the Nyquist frequency of its own axis stands for both signs, which no
-/// oriented filter can tell apart: it is given a radius of at least one, and so belongs to the high-pass.
+/// Values of a filter at the bins of a level, as a function of physical frequencies (z, y, x) in cycles per finest
+/// spacing and of the radius in units of the Nyquist frequency of that spacing.
+///
+/// A bin at the Nyquist frequency of its axis represents both signs, which oriented filters cannot distinguish: it gets
+/// a radius of at least one, and so belongs to the high-pass.
 fn sample_filter<T: Real>(
     fft: &RealFft<T>,
     original: &[usize],
@@ -287,7 +293,7 @@ fn sample_filter<T: Real>(
 
 /// Calls `copy(start in the large spectrum, start in the small one, length)` for the bins that a crop keeps.
 ///
-/// The bin of frequency −m/2 of an even length m is kept as it comes: the low-pass has made it zero.
+/// The bin of frequency −m/2 of an even length m needs no special treatment: it is zero after the low-pass.
 fn for_kept_rows(large: &[usize], small: &[usize], mut copy: impl FnMut(usize, usize, usize)) {
     let axes = large.len();
     let (large_half, small_half) = (large[axes - 1] / 2 + 1, small[axes - 1] / 2 + 1);
@@ -308,7 +314,7 @@ fn for_kept_rows(large: &[usize], small: &[usize], mut copy: impl FnMut(usize, u
     }
 }
 
-/// Applies `f(value, index)` to every value, in parallel blocks if there are many.
+/// Applies `f(value, index)` to every value, in parallel blocks for large arrays.
 fn each<V: Send>(values: &mut [V], f: impl Fn(&mut V, usize) + Sync) {
     if values.len() < PARALLEL_FROM {
         values.iter_mut().enumerate().for_each(|(i, v)| f(v, i));
@@ -319,7 +325,7 @@ fn each<V: Send>(values: &mut [V], f: impl Fn(&mut V, usize) + Sync) {
     }
 }
 
-/// Applies `f(out, value, filter)` along three arrays, in parallel blocks if they are long.
+/// Applies `f(out, value, filter)` along three arrays, in parallel blocks for large arrays.
 fn pair<T: Real>(
     out: &mut [Complex<T>],
     values: &[Complex<T>],

@@ -1,4 +1,4 @@
-//! The texture in the making: colour components of every sample, and the two steps that every synthesis repeats.
+//! The texture during synthesis: colour components of every sample, and the two steps that every synthesis repeats.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::matching::{Extent, Table, match_by_table, match_exactly};
 use crate::targets::BandTargets;
 use crate::{Matching, Quantiles};
 
-/// Samples whose colours are changed at a time.
+/// Number of samples whose colours are converted at once.
 const BLOCK: usize = 1 << 14;
 
 /// Components of the samples, planar.
@@ -27,19 +27,19 @@ impl<'a> Canvas<'a> {
         }
     }
 
-    /// Gives every channel the exemplar's distribution.
+    /// Matches every channel to the distribution of the exemplar.
     pub(crate) fn match_channels(&mut self) {
         let mut channels = self.channels();
         for (channel, reference) in channels.iter_mut().zip(&self.exemplar.channels) {
             match_values(channel, reference, self.matching);
         }
         let colours = &self.exemplar.colours;
-        turn(&channels, &mut self.components, |colour, component| {
+        convert(&channels, &mut self.components, |colour, component| {
             colours.decorrelate(colour, component);
         });
     }
 
-    /// Channels of the samples, interleaved, with the exemplar's distribution.
+    /// Interleaved channels of the samples, matched to the distribution of the exemplar.
     pub(crate) fn finish(self) -> Vec<f32> {
         let mut channels = self.channels();
         drop(self.components);
@@ -65,7 +65,7 @@ impl<'a> Canvas<'a> {
     fn channels(&self) -> Vec<Vec<f32>> {
         let colours = &self.exemplar.colours;
         let mut channels: Vec<Vec<f32>> = self.components.iter().map(|c| vec![0.0; c.len()]).collect();
-        turn(&self.components, &mut channels, |component, colour| {
+        convert(&self.components, &mut channels, |component, colour| {
             colours.recombine(component, colour);
         });
         channels
@@ -73,7 +73,7 @@ impl<'a> Canvas<'a> {
 }
 
 /// Applies a map of colours to planar samples.
-fn turn(from: &[Vec<f32>], to: &mut [Vec<f32>], map: impl Fn(&[f32], &mut [f32]) + Sync) {
+fn convert(from: &[Vec<f32>], to: &mut [Vec<f32>], map: impl Fn(&[f32], &mut [f32]) + Sync) {
     let n = from[0].len();
     let mut blocks: Vec<(usize, Vec<&mut [f32]>)> = (0..n.div_ceil(BLOCK))
         .map(|block| (block * BLOCK, Vec::with_capacity(to.len())))
@@ -94,7 +94,7 @@ fn turn(from: &[Vec<f32>], to: &mut [Vec<f32>], map: impl Fn(&[f32], &mut [f32])
     });
 }
 
-/// Gives the values of a band the target distribution. Returns ln(variance / target) before.
+/// Matches the values of a band to the target distribution. Returns ln(variance / target) before matching.
 pub(crate) fn match_band(values: &mut [f32], target: &Quantiles, matching: Matching) -> Option<f64> {
     let extent = Extent::of(values);
     match matching {
@@ -117,9 +117,10 @@ fn match_values(values: &mut [f32], reference: &Quantiles, matching: Matching) {
     }
 }
 
-/// Gives the bands of a field's members (the slices of a volume, or the one image or volume) the target distributions,
-/// each band over all members at once, after the members' powers have been brought nearer to each other ([`evening_factors`]).
-/// `coefficients` is kept for the next call. Returns `Σ ln²(variance / target)` over the bands, and their number.
+/// Matches the bands of the members of a field (the slices of a volume, or the single image or volume) to the target
+/// distributions, each band over all members at once, after the powers of the members have been equalised partially
+/// ([`evening_factors`]). `coefficients` is a buffer that is reused by the next call. Returns `Σ ln²(variance /
+/// target)` over the bands, and their number.
 pub(crate) fn match_bands(
     field: &mut [f32],
     bank: &FilterBank<f32>,
@@ -185,7 +186,7 @@ pub(crate) fn match_bands(
     (errors.iter().map(|e| e * e).sum(), errors.len())
 }
 
-/// The bands of all members times their factors, then matched by rank.
+/// Multiplies the bands of all members by their factors and matches them by rank.
 fn match_bands_exactly(
     coefficients: &mut [f32],
     bank: &FilterBank<f32>,
@@ -220,8 +221,8 @@ fn match_bands_exactly(
         .collect()
 }
 
-/// Factors, by member and band, that bring the power of every member in every level (orientations together) nearer to the mean
-/// over the members: by `evenness` of the way, in logarithms.
+/// Factors by member and band that bring the power of every member in every level (orientations together) towards the
+/// mean over the members. `evenness` is the fraction of the logarithmic difference that is removed.
 fn evening_factors(extents: &[Vec<Extent>], bank: &FilterBank<f32>, evenness: f64) -> Vec<Vec<f32>> {
     let (bands, count) = (bank.ranges().len(), bank.orientations());
     let mut factors = vec![vec![1.0; bands]; extents.len()];

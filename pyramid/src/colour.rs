@@ -1,10 +1,10 @@
-//! Colours as independent numbers: the principal axes of an exemplar's colours, or of what brightness leaves of them.
+//! Uncorrelated colour components: the principal axes of the colours of an exemplar, optionally after brightness.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Mean and principal axes of a set of colours (any number of channels).
 ///
-/// Along the axes the colours are uncorrelated, so that each component can be synthesised on its own.
+/// The components along the axes are uncorrelated, so each component can be synthesised separately.
 ///
 /// # References
 ///
@@ -35,7 +35,8 @@ pub struct PrincipalColours {
 }
 
 impl PrincipalColours {
-    /// Axes of colours with `channels` channels, by falling variance; each points to where its channels sum to more.
+    /// Principal axes of colours with `channels` channels, by decreasing variance, with the sign that makes the sum of
+    /// each axis positive.
     ///
     /// # Panics
     ///
@@ -68,16 +69,17 @@ impl PrincipalColours {
         }
     }
 
-    /// The same colours with a weighted sum of the channels, such as their brightness, as the first component; then, by falling
-    /// variance, the principal axes of what it does not tell of the colours (their regression on it taken away). The components
-    /// are uncorrelated still.
+    /// The same colours with a weighted sum of the channels, such as brightness, as the first component, followed by
+    /// the principal axes of the residual colours (after regression on that sum) by decreasing variance. The components
+    /// are still uncorrelated.
     ///
-    /// Components that are uncorrelated as a whole need not be so in every band of frequencies. What is made of them apart so has
-    /// the statistics of each, and not those of their sums: brightness, to which eyes are most sensitive, is better one of them.
+    /// Components that are uncorrelated overall can be correlated within a frequency band. Components synthesised
+    /// separately have their own statistics, but not those of their sums: therefore brightness, to which the eye is
+    /// most sensitive, should be a component.
     ///
     /// # Panics
     ///
-    /// If there are not as many weights as channels, or all are zero.
+    /// If the number of weights is not the number of channels, or all weights are zero.
     ///
     /// # Examples
     ///
@@ -104,14 +106,14 @@ impl PrincipalColours {
             &self.colours * DMatrix::from_diagonal(&DVector::from_column_slice(&self.variances)) * &self.axes;
         let variance = first.dot(&(&covariance * &first));
         let all = covariance.trace();
-        // What the colours are on average where the sum is one more.
+        // Mean change of the colours per unit of the sum.
         let slope = if variance > 1e-9 * all {
             &covariance * &first / variance
         } else {
             first.clone()
         };
         let left = covariance - variance * &slope * slope.transpose();
-        // Made the first axis, so that the others are at right angles to it.
+        // The added term makes `first` the first axis, so that the others are orthogonal to it.
         let (basis, variances) = principal_axes(left + 2.0 * all.max(f64::MIN_POSITIVE) * &first * first.transpose());
         let mut axes = basis.clone();
         let mut colours = basis.transpose();
@@ -136,7 +138,7 @@ impl PrincipalColours {
         &self.mean
     }
 
-    /// Variance of the colours that goes with each component; falling, but for a first one that was chosen.
+    /// Variance of the colours in each component, decreasing except for a chosen first component.
     #[must_use]
     pub fn variances(&self) -> &[f64] {
         &self.variances
@@ -166,7 +168,7 @@ impl PrincipalColours {
     }
 }
 
-/// Axes (rows) by falling variance, each pointing to where its channels sum to more, and the variances.
+/// Axes (rows) by decreasing variance, each with a positive sum, and the variances.
 fn principal_axes(covariance: DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     let channels = covariance.nrows();
     let eigen = SymmetricEigen::new(covariance);

@@ -1,8 +1,8 @@
-//! The bands of the cuts of a periodic volume by planes of any direction, exactly and without interpolation.
+//! The bands of cuts of a periodic volume by planes of any direction, exactly and without interpolation.
 //!
-//! A wave k of the volume shows on a plane of unit normal n as a wave of the tangential frequency κ = k − (k · n) n. A 2D
-//! filter of every plane of that normal is therefore a 3D filter that depends on κ alone, and the mean square of a band
-//! over all these planes follows from the volume's power:
+//! On a plane with unit normal n, a wave k of the volume appears with the tangential frequency κ = k − (k · n) n.
+//! Filtering every plane of that normal in 2D is therefore a 3D filter that depends on κ only, and the mean square of a
+//! band over all these planes follows from the power of the volume:
 //!
 //! ```text
 //! band(p) on the planes normal to n = FT⁻¹[ G(|κ|) A_b(angle of κ) v̂ ](p)        mean square = Σ_k |v̂(k)|² G²(|κ|) A_b²
@@ -19,22 +19,24 @@ use crate::filters::{Directions, band_response};
 use crate::matching::whole_and_part;
 use crate::wave_change::Change;
 
-/// Steps of the tables of responses, up to the corner of the cube.
+/// Number of steps of the tables of responses, up to the corner of the cube of frequencies.
 pub(crate) const STEPS: usize = 1 << 12;
-/// Planes of frequencies are summed in this many blocks.
+/// Number of blocks in which planes of frequencies are summed.
 const BLOCKS: usize = 16;
-/// Mean squares of the pyramid bands of all cuts of a periodic volume (z, y, x) by planes of each normal (x, y, z): for every
-/// normal the high-pass, each level with its orientations added up, and the low-pass (the mean of the volume included).
+
+/// Mean squares of the pyramid bands of all cuts of a periodic volume (z, y, x) by planes of each normal (x, y, z).
 ///
-/// `O(N log N)`, and `O(N)` for each normal. Whether a texture looks the same on cuts of all directions can be read off at once.
+/// For every normal: the high-pass, each level with its orientations summed, and the low-pass (including the mean of
+/// the volume). `O(N log N)`, plus `O(N)` per normal. Shows whether a texture looks the same on cuts of all directions.
 ///
 /// # Errors
 ///
-/// [`PyramidError::VolumeLevels`] for a side under 8 samples or levels that do not fit, [`PyramidError::VolumeNotFinite`].
+/// [`PyramidError::VolumeLevels`] for a side under 8 samples or levels that do not fit,
+/// [`PyramidError::VolumeNotFinite`].
 ///
 /// # Examples
 ///
-/// A wave along x shows on planes normal to y, and is no more than a constant on those normal to x:
+/// A wave along x appears on planes normal to y, and is constant on planes normal to x:
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -43,8 +45,8 @@ const BLOCKS: usize = 16;
 ///
 /// let wave = Array3::from_shape_fn((16, 16, 16), |(_, _, x)| (x as f32 * std::f32::consts::TAU / 4.0).cos());
 /// let bands = cut_variances(wave.view(), &[Vector3::y_axis(), Vector3::x_axis()], 1)?;
-/// assert!((bands[0][1] - 0.5).abs() < 1e-5, "all of it at the finest level");
-/// assert!((bands[1][2] - 0.5).abs() < 1e-5, "all of it in the low-pass");
+/// assert!((bands[0][1] - 0.5).abs() < 1e-5, "all power is at the finest level");
+/// assert!((bands[1][2] - 0.5).abs() < 1e-5, "all power is in the low-pass");
 /// # Ok::<(), stereology_pyramid::PyramidError>(())
 /// ```
 pub fn cut_variances(
@@ -57,9 +59,9 @@ pub fn cut_variances(
     Ok(Cuts::new(size, levels).variances(&values, normals))
 }
 
-/// One band of all cuts of a periodic volume (z, y, x) by planes of a normal (x, y, z), at every sample of the volume: what
-/// the band of the plane through that sample has there. `level` counts from 0; orientation `b` of `orientations` is at the
-/// angle `π b / K` in the plane.
+/// One band of all cuts of a periodic volume (z, y, x) by planes of a normal (x, y, z), at every sample of the volume:
+/// the value of the band of the plane through that sample. `level` counts from 0; orientation `b` of `orientations` has
+/// the angle `π b / K` in the plane.
 ///
 /// `O(N log N)`.
 ///
@@ -96,7 +98,9 @@ pub fn cut_band(
 ) -> Result<Array3<f32>, PyramidError> {
     let size = checked(volume, level + 1)?;
     if orientation >= orientations || orientations > 32 {
-        return Err(PyramidError::Orientations { asked: orientations });
+        return Err(PyramidError::Orientations {
+            requested: orientations,
+        });
     }
     let directions = Directions::plane(orientations);
     let mut cuts = Cuts::new(size, level + 1);
@@ -132,7 +136,7 @@ fn checked(volume: ArrayView3<'_, f32>, levels: usize) -> Result<[usize; 3], Pyr
     if levels == 0 || levels > most {
         return Err(PyramidError::VolumeLevels {
             shape: [nz, ny, nx],
-            asked: levels,
+            requested: levels,
             most,
         });
     }
@@ -142,7 +146,7 @@ fn checked(volume: ArrayView3<'_, f32>, levels: usize) -> Result<[usize; 3], Pyr
     Ok([nz, ny, nx])
 }
 
-/// The planes of a normal: two directions at right angles in them, (x, y, z).
+/// The planes of a normal, with two orthogonal directions in them, (x, y, z).
 pub(crate) struct Frame {
     pub(crate) normal: Vector3<f64>,
     pub(crate) along: [Vector3<f64>; 2],
@@ -167,7 +171,7 @@ fn normals(of: &[[f64; 3]]) -> Vec<Unit<Vector3<f64>>> {
     of.iter().map(|v| Unit::new_normalize(Vector3::from(*v))).collect()
 }
 
-/// Normals along the diagonals of the cube's faces.
+/// Normals along the face diagonals of the cube.
 pub(crate) fn face_diagonals() -> Vec<Unit<Vector3<f64>>> {
     normals(&[
         [1.0, 1.0, 0.0],
@@ -192,8 +196,8 @@ pub(crate) fn thirteen_normals() -> Vec<Unit<Vector3<f64>>> {
     all
 }
 
-/// Power between two steps of a table, and the part of it that goes to the upper one.
-type Shares = Vec<[f64; 2]>;
+/// Power between two steps of a table, and its part that belongs to the upper step.
+type Parts = Vec<[f64; 2]>;
 
 /// The transform of volumes of one size, and the squared responses of the bands.
 pub(crate) struct Cuts {
@@ -227,8 +231,8 @@ impl Cuts {
         self.band_powers(&power, (field.len() as f64).powi(-2))
     }
 
-    /// Power of the transform by the radius of the tangential frequency, for every normal; and, if waves are `changed`, what
-    /// is asked about them afterwards.
+    /// Power of the transform by the radius of the tangential frequency, for every normal. If waves are `changed`, also
+    /// the products for the Hessian, after the change.
     pub(crate) fn power_by_radius(
         &mut self,
         normals: &[Unit<Vector3<f64>>],
@@ -236,8 +240,8 @@ impl Cuts {
     ) -> (Vec<Vec<f64>>, Vec<f64>) {
         let (size, half) = (self.size, self.size[2] / 2 + 1);
         let rows = (size[0] * size[1]).div_ceil(BLOCKS);
-        // One sum a block, added in order: the same bits at any number of threads.
-        let blocks: Vec<(Vec<Shares>, Vec<f64>)> = self
+        // One sum per block, added in order: the same bits at any number of threads.
+        let blocks: Vec<(Vec<Parts>, Vec<f64>)> = self
             .spectrum
             .par_chunks_mut(rows * half)
             .enumerate()
@@ -311,8 +315,10 @@ fn wave(size: [usize; 3], row: usize, x: usize) -> Vector3<f64> {
     )
 }
 
-/// Radius of the tangential frequency of a bin, Nyquist 1. A bin at the Nyquist frequency of an axis stands for both signs;
-/// unless the normal lies along that axis, the two differ on the plane: then it belongs to the high-pass.
+/// Radius of the tangential frequency of a bin, Nyquist 1.
+///
+/// A bin at the Nyquist frequency of an axis represents both signs. Unless the normal lies along that axis, the two
+/// differ on the plane, and the bin belongs to the high-pass.
 fn radius(size: [usize; 3], row: usize, x: usize, k: &Vector3<f64>, normal: &Unit<Vector3<f64>>) -> f64 {
     let radius = 2.0 * (k.norm_squared() - k.dot(normal).powi(2)).max(0.0).sqrt();
     let bins = [(x, size[2]), (row % size[1], size[1]), (row / size[1], size[0])];
@@ -324,7 +330,7 @@ fn radius(size: [usize; 3], row: usize, x: usize, k: &Vector3<f64>, normal: &Uni
     if ambiguous { radius.max(1.0) } else { radius }
 }
 
-/// Places in the tables of the radii of the tangential frequencies of a row of bins: see [`radius`].
+/// Positions in the tables for the radii of the tangential frequencies of a row of bins: see [`radius`].
 #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
 fn positions_of_row(size: [usize; 3], row: usize, normal: &Unit<Vector3<f64>>, positions: &mut [f32]) {
     let start = wave(size, row, 0);
@@ -350,7 +356,7 @@ fn positions_of_row(size: [usize; 3], row: usize, normal: &Unit<Vector3<f64>>, p
     }
 }
 
-/// A function of a band's squared response, tabulated over the radius.
+/// A function of the squared response of a band, tabulated over the radius.
 fn responses(band: usize, levels: usize, of: fn(f64) -> f64) -> Vec<f64> {
     (0..STEPS + 2)
         .map(|i| of(band_response(2.0 * i as f64 / STEPS as f64, band, levels).powi(2)))

@@ -1,4 +1,4 @@
-//! Exemplars: pictures of textures, checked and taken apart into colour components.
+//! Exemplars: images of textures, checked and decomposed into colour components.
 
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use rayon::prelude::*;
@@ -9,36 +9,36 @@ use stereology_spectrum::{
 use crate::fill::fill_outside;
 use crate::{Edges, PrincipalColours, Quantiles, TextureError};
 
-/// Fewest pixels that statistics are taken from.
+/// Smallest number of pixels for statistics.
 pub(crate) const FEWEST_PIXELS: usize = 64;
-/// Quantiles kept of a band or channel: beyond, they say nothing new.
+/// Number of quantiles kept per band or channel; more add no information.
 const QUANTILES: usize = 1 << 16;
-/// Samples of a pool that are sorted; larger pools are thinned out evenly.
+/// Largest number of samples that are sorted; larger pools are subsampled evenly.
 const SAMPLES: usize = 1 << 22;
-/// Radial bins of the slice spectrum up to Nyquist.
+/// Number of radial bins of the slice spectrum up to Nyquist.
 const RADIAL_BINS: usize = 32;
-/// Shares of red, green and blue in brightness (Rec. 601, of encoded values).
+/// Weights of red, green and blue in brightness (Rec. 601, of encoded values).
 const BRIGHTNESS: [f64; 3] = [0.299, 0.587, 0.114];
-/// Farthest lag of the covariance under a mask, in pixels.
+/// Largest lag of the covariance under a mask, in pixels.
 const REACH: usize = 64;
 
-/// A picture of a texture (rows, columns, channels), values of any range around any mean, and the pixels that count.
+/// An image of a texture (rows, columns, channels) with values of any range, and the mask of the pixels that count.
 #[derive(Clone, Copy, Debug)]
 pub struct Exemplar<'a> {
     /// Values (y, x, channel).
     pub image: ArrayView3<'a, f32>,
-    /// Pixels whose statistics count; all, if `None`. Values outside are never read.
+    /// Mask of the pixels that count; `None` for all. Values outside are never read.
     pub mask: Option<ArrayView2<'a, bool>>,
 }
 
 impl<'a> Exemplar<'a> {
-    /// An exemplar all of whose pixels count.
+    /// An exemplar in which all pixels count.
     #[must_use]
     pub fn new(image: ArrayView3<'a, f32>) -> Self {
         Self { image, mask: None }
     }
 
-    /// With a mask (y, x) that is true where pixels count.
+    /// Sets the mask (y, x), true for the pixels that count.
     #[must_use]
     pub fn with_mask(mut self, mask: ArrayView2<'a, bool>) -> Self {
         self.mask = Some(mask);
@@ -46,7 +46,7 @@ impl<'a> Exemplar<'a> {
     }
 }
 
-/// Exemplars (one, or one an axis) that were checked, freed of their edges and taken apart into common colour components.
+/// Checked exemplars (one, or one per axis), with treated edges and common colour components.
 pub(crate) struct Prepared {
     pub(crate) colours: PrincipalColours,
     /// Distribution of each channel.
@@ -56,7 +56,7 @@ pub(crate) struct Prepared {
 
 /// One exemplar's colour components.
 pub(crate) struct View {
-    /// Components (y, x), the pixels outside the mask filled smoothly; of twice the sides if mirrored.
+    /// Components (y, x), filled smoothly outside the mask; with twice the sides if mirrored.
     pub(crate) components: Vec<Array2<f32>>,
     pub(crate) mask: Option<Array2<bool>>,
     edges: Edges,
@@ -100,7 +100,7 @@ impl Prepared {
             planes_of.push(planes);
             masks.push(mask);
         }
-        // Every exemplar has the same say, whatever its size.
+        // Every exemplar has the same weight, whatever its size.
         let least = inside.iter().map(|values| values.len() / channels).min().unwrap_or(0);
         let pooled: Vec<f32> = inside
             .iter()
@@ -145,18 +145,18 @@ impl Prepared {
         self.channels.len()
     }
 
-    /// Share of the variance that a component has.
-    pub(crate) fn share(&self, component: usize) -> f64 {
+    /// Fraction of the variance in a component.
+    pub(crate) fn variance_fraction(&self, component: usize) -> f64 {
         let variances = self.colours.variances();
         variances[component] / variances.iter().sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// Whether a component varies enough to have a texture.
+    /// Whether a component varies enough to be synthesised.
     pub(crate) fn varies(&self, component: usize) -> bool {
-        self.colours.variances()[component] > 1e-12 && self.share(component) > 1e-9
+        self.colours.variances()[component] > 1e-12 && self.variance_fraction(component) > 1e-9
     }
 
-    /// Spectrum that the slices of a volume should have in one component: the mean over the exemplars.
+    /// Target spectrum of the slices of a volume in one component: the mean over the exemplars.
     pub(crate) fn slice_spectrum(&self, component: usize) -> RadialSpectrum {
         let mut spectra = self.views.iter().map(|view| view.spectrum(component));
         let mut mean = spectra.next().expect("at least one exemplar");
@@ -199,7 +199,7 @@ impl View {
     }
 }
 
-/// Checks sizes, channels, mask and values; the mask, if it leaves anything out.
+/// Checks sizes, channels, mask and values. Returns the mask if it excludes any pixel.
 fn checked_mask(exemplar: &Exemplar<'_>) -> Result<Option<Array2<bool>>, TextureError> {
     let (height, width, channels) = exemplar.image.dim();
     if height < 8 || width < 8 {
@@ -253,7 +253,7 @@ fn components(planes: &[Array2<f32>], colours: &PrincipalColours) -> Vec<Array2<
     components
 }
 
-/// An image with its mirror images beside and below it: twice the sides, no jump where it repeats.
+/// An image with its mirror images beside and below it: twice the sides, without a jump where it wraps around.
 fn mirrored<T: Copy>(image: ArrayView2<'_, T>) -> Array2<T> {
     let (height, width) = image.dim();
     let back = |i: usize, n: usize| if i < n { i } else { 2 * n - 1 - i };
@@ -262,7 +262,7 @@ fn mirrored<T: Copy>(image: ArrayView2<'_, T>) -> Array2<T> {
     })
 }
 
-/// One channel, filled outside the mask, its edges taken care of, with the mean of its pixels that count kept.
+/// One channel, filled outside the mask and with treated edges; the mean inside the mask is kept.
 fn plane_without_edges(plane: ArrayView2<'_, f32>, mask: Option<&Array2<bool>>, edges: Edges) -> Array2<f32> {
     let mut plane = plane.to_owned();
     if let Some(mask) = mask {
@@ -281,7 +281,7 @@ fn plane_without_edges(plane: ArrayView2<'_, f32>, mask: Option<&Array2<bool>>, 
         let (sum, n) = inside.fold((0.0, 0.0), |(sum, n), (_, &v)| (sum + f64::from(v), n + 1.0));
         sum / n
     };
-    let mut periodic = periodic_component(plane.view()).expect("a checked image, filled where it was not");
+    let mut periodic = periodic_component(plane.view()).expect("a checked image, filled outside the mask");
     #[allow(clippy::cast_possible_truncation, reason = "a small correction of f32 values")]
     let shift = (mean(&plane) - mean(&periodic)) as f32;
     periodic.mapv_inplace(|v| v + shift);
@@ -323,7 +323,7 @@ fn masked_spectrum(image: &Array2<f64>, mask: ArrayView2<'_, bool>) -> RadialSpe
         count[bin] += twice;
     }
     power.iter_mut().zip(&count).for_each(|(p, &c)| *p /= c.max(1) as f64);
-    // An estimate from few pairs can fall below zero.
+    // An estimate from few pairs can be negative.
     let floor = 1e-5 * power.iter().copied().fold(0.0, f64::max);
     power.iter_mut().for_each(|p| *p = p.max(floor));
     RadialSpectrum {

@@ -1,12 +1,12 @@
-//! Smooth filling of the pixels that a mask leaves out, so that its border puts no step into the bands.
+//! Smooth filling of the pixels outside a mask, so that the border of the mask adds no step to the bands.
 
 use ndarray::{Array2, ArrayView2};
 
-/// Sweeps of relaxation at each scale.
+/// Number of relaxation sweeps at each scale.
 const SWEEPS: usize = 12;
 
-/// Replaces the values outside the mask by a membrane stretched over those inside it: the discrete Laplace equation, solved
-/// from coarse to fine. Values inside the mask are kept; those outside are never read. `O(N)`.
+/// Replaces the values outside the mask by the solution of the discrete Laplace equation with the values inside as
+/// boundary, computed from coarse to fine. Values inside the mask are kept; values outside are never read. `O(N)`.
 pub(crate) fn fill_outside(image: &mut Array2<f32>, mask: ArrayView2<'_, bool>) {
     let (height, width) = image.dim();
     if mask.iter().all(|&m| m) {
@@ -64,7 +64,8 @@ mod tests {
     use super::fill_outside;
     use ndarray::Array2;
 
-    /// A plane solves the Laplace equation: a hole in it is filled with the plane, and the garbage in it is not read.
+    /// A plane solves the Laplace equation: a hole in a plane is filled with the plane, and the values in the hole are
+    /// not read.
     #[test]
     fn a_plane_is_filled_with_itself() {
         let plane = Array2::from_shape_fn((40, 50), |(y, x)| 0.02 * y as f32 - 0.01 * x as f32);

@@ -10,7 +10,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Part of the amplitude at radius `r` that passes above the cut `c`.
+/// Fraction of the amplitude at radius `r` that passes above the cutoff `c`.
 pub(crate) fn high_pass(r: f64, c: f64) -> f64 {
     if r >= c {
         1.0
@@ -21,7 +21,7 @@ pub(crate) fn high_pass(r: f64, c: f64) -> f64 {
     }
 }
 
-/// Part of the amplitude at radius `r` that passes below the cut `c`.
+/// Fraction of the amplitude at radius `r` that passes below the cutoff `c`.
 pub(crate) fn low_pass(r: f64, c: f64) -> f64 {
     if r >= c {
         0.0
@@ -32,7 +32,8 @@ pub(crate) fn low_pass(r: f64, c: f64) -> f64 {
     }
 }
 
-/// Radial response of a band of a pyramid: 0 the high-pass, 1 to `levels` the levels from the finest, beyond the low-pass.
+/// Radial response of a band of a pyramid: 0 is the high-pass, 1 to `levels` are the levels from the finest, larger
+/// numbers the low-pass.
 pub(crate) fn band_response(r: f64, band: usize, levels: usize) -> f64 {
     let cut = |level: usize| 0.5_f64.powi(i32::try_from(level).unwrap_or(i32::MAX) + 1);
     let below = |levels: usize| low_pass(r, 1.0) * (0..levels).map(|l| low_pass(r, cut(l))).product::<f64>();
@@ -45,7 +46,7 @@ pub(crate) fn band_response(r: f64, band: usize, levels: usize) -> f64 {
     }
 }
 
-/// The directions of the oriented filters of one pyramid, and the power of the cosine they rest on.
+/// The directions of the oriented filters of one pyramid, and their power of the cosine.
 #[derive(Clone, Debug)]
 pub(crate) struct Directions {
     /// Unit vectors (z, y, x).
@@ -56,7 +57,7 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
-    /// No direction: one filter that takes all.
+    /// No direction: one filter that passes everything.
     pub(crate) fn none() -> Self {
         Self::plane(1)
     }
@@ -78,7 +79,7 @@ impl Directions {
         }
     }
 
-    /// Unit vectors of space that share out all power: Σ_b (v_b · u)^2p = n / (2p + 1) for every unit vector u.
+    /// A tight family of unit vectors: Σ_b (v_b · u)^2p = n / (2p + 1) for every unit vector u.
     pub(crate) fn space(vectors: Vec<[f64; 3]>, power: i32) -> Self {
         Self {
             gain: (f64::from(2 * power + 1) / vectors.len() as f64).sqrt(),
@@ -88,7 +89,7 @@ impl Directions {
         }
     }
 
-    /// The filters a quarter of a wave apart from these: `−i sgn(v · u)` times them.
+    /// The filters in quadrature with these: `−i sgn(v · u)` times these filters.
     pub(crate) fn partner(&self) -> Self {
         Self {
             partner: true,
@@ -148,9 +149,9 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// What does not pass above passes below, in power; and the oriented filters share out all of it.
+        /// The powers above and below a cutoff sum to one, and so do the powers of the oriented filters.
         #[test]
-        fn filters_share_out_all_power(r in 0.0_f64..2.0, c in 0.01_f64..1.0, angle in 0.0_f64..6.3, count in 1_usize..12) {
+        fn filters_divide_all_power(r in 0.0_f64..2.0, c in 0.01_f64..1.0, angle in 0.0_f64..6.3, count in 1_usize..12) {
             prop_assert!((high_pass(r, c).powi(2) + low_pass(r, c).powi(2) - 1.0).abs() < 1e-14);
             let plane = Directions::plane(count);
             let power: f64 = (0..count).map(|b| plane.amplitude(b, &[0.0, angle.sin(), angle.cos()]).powi(2)).sum();

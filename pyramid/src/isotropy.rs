@@ -1,8 +1,8 @@
-//! Power made the same in all directions: what the matching of slices does to directions, undone.
+//! Equalisation of the power over directions, which the matching of slices makes unequal.
 //!
-//! Slices lie along the axes only, so where the exemplar's spectrum is not quite that of any isotropic volume, matching them
-//! gives the missing power to waves along the axes or across them. On every shell of frequencies the power is fitted by the
-//! cubic harmonics of degrees 4 and 6 of the direction u, and divided by the fit:
+//! Slices lie along the axes only. Where the spectrum of the exemplar is not exactly that of slices of any isotropic
+//! volume, matching adds the missing power to waves along the axes or perpendicular to them. On every shell of
+//! frequencies the power is fitted by cubic harmonics of degrees 4 and 6 of the direction u, and divided by the fit:
 //!
 //! ```text
 //! P(k) ≈ c₀ + c₁ Y₄(u) + c₂ Y₆(u),   Y₄ = Σ u_i⁴ − 3/5,   Y₆ = u_x² u_y² u_z² + Y₄/22 − 1/105
@@ -12,14 +12,14 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use stereology_spectrum::{Complex, RealFft, frequency};
 
-/// Shells of frequencies up to the corner of the cube.
+/// Number of shells of frequencies up to the corner of the cube.
 const SHELLS: usize = 56;
-/// A shell of fewer frequencies is left alone.
+/// A shell with fewer frequencies is not changed.
 const FEWEST: f64 = 60.0;
-/// No power is changed by more than this factor.
+/// Largest factor by which power is changed.
 const MOST: f64 = 3.0;
 
-/// The transform of a volume's fields, and buffers.
+/// The transform of the fields of a volume, and buffers.
 pub(crate) struct Isotropy {
     fft: RealFft<f32>,
     size: [usize; 3],
@@ -27,7 +27,7 @@ pub(crate) struct Isotropy {
     work: stereology_spectrum::Work<f32>,
 }
 
-/// What a row of frequencies adds to a shell's least squares.
+/// Contribution to the least squares of a shell.
 #[derive(Clone, Copy)]
 struct Sums {
     normal: Matrix3<f64>,
@@ -45,7 +45,7 @@ impl Isotropy {
         }
     }
 
-    /// Divides each shell's power by its dependence on direction, its mean kept.
+    /// Divides the power of each shell by its dependence on direction and keeps its mean.
     pub(crate) fn restore(&mut self, field: &mut [f32]) {
         self.fft.forward_into(field, &mut self.spectrum, &mut self.work);
         let (size, half) = (self.size, self.size[2] / 2 + 1);
@@ -53,7 +53,7 @@ impl Isotropy {
             normal: Matrix3::zeros(),
             right: Vector3::zeros(),
         };
-        // One sum a plane, added in order: the same bits at any number of threads.
+        // One sum per plane, added in order: the same bits at any number of threads.
         let planes: Vec<Vec<Sums>> = self
             .spectrum
             .par_chunks(half * size[1])
@@ -114,7 +114,7 @@ fn harmonics(size: [usize; 3], bin: [usize; 3]) -> (f64, Vector3<f64>) {
     let u = k.map(|k| k / square);
     let fourth = u.iter().map(|u| u * u).sum::<f64>() - 0.6;
     let sixth = u[0] * u[1] * u[2] + fourth / 22.0 - 1.0 / 105.0;
-    // Scaled so that both have about unit size.
+    // Scaled to about unit size.
     (square.sqrt(), Vector3::new(1.0, 4.0 * fourth, 40.0 * sixth))
 }
 

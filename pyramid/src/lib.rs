@@ -1,25 +1,26 @@
 //! Steerable pyramid, histogram matching, and Heeger-Bergen texture synthesis in 2D and 3D.
 //!
-//! A photograph of a texture becomes a volume whose slices look like the photograph, at its pixel scale, and that repeats
-//! without a seam. What makes a texture look as it does is taken to be the distribution of its values, channel by
-//! channel, and of its bands: what is left of it at each scale and in each direction.
+//! From a photograph of a texture this crate synthesises a volume whose slices look like the photograph, at its pixel
+//! scale, and that is periodic without a seam. A texture is described by the distribution of its values in every
+//! channel, and of its sub-bands: the parts of the image at each scale and orientation.
 //!
 //! ```text
 //! r = 2 |frequency|, Nyquist is 1;  H_c(r) = sin(π/2 (1 + clamp(log2(r/c), −1, 0))),  L_c = cos(same)
-//! level l (0 the finest): bands H_{2^−(l+1)}(r) A_b(θ), then L_{2^−(l+1)}(r), then the spectrum on ceil(n/2) bins an axis
+//! level l (0 the finest): bands H_{2^−(l+1)}(r) A_b(θ), then L_{2^−(l+1)}(r), then the spectrum on ceil(n/2) bins per axis
 //! A_b(θ) = α cos^(K−1)(θ − πb/K) (−i)^(K−1),  Σ_b |A_b|² = 1;  reconstruction with the conjugate filters is exact
 //! a value of rank i of n → the reference's quantile at (i + 1/2)/n          histogram matching
 //! S2(κ) = ∫ S3(√(κ² + k_z²)) dk_z                                           spectrum of the slices of a volume
 //! ```
 //!
-//! Giving 3D bands the distributions of 2D bands ([`Mode::Volume`], the method of 1995 and 2004) makes slices that are too
-//! smooth, because a slice sees every wave of the volume that crosses it: their band variances miss the photograph's by
-//! 20 to 40 %, however many rounds. [`Mode::Spectrum`] inverts the relation between the spectra first;
-//! [`Mode::Slices`], the default, then matches the bands of the slices and of oblique planes themselves, keeps the power the
-//! same in all directions and the slices about equally strong, and at the end gives cuts of all directions the right band
-//! variances at once; [`Mode::Oriented`] takes an exemplar an axis. Root mean square of ln(band variance / the exemplar's) and
-//! mean Wasserstein distance of bands (in standard deviations), over the slices and over the oblique cuts of 64³ in colour after
-//! 5 rounds, and processor seconds at 128³ on a busy 2020s server core:
+//! Matching 3D bands to the distributions of 2D bands ([`Mode::Volume`], the method of 1995 and 2004) gives slices that
+//! are too smooth, because a slice contains every wave of the volume that crosses it: their band variances differ from
+//! those of the photograph by 20 to 40 %, however many iterations are made. [`Mode::Spectrum`] first inverts the
+//! relation between the spectra. [`Mode::Slices`], the default, then matches the bands of the slices and of oblique
+//! planes themselves, keeps the power equal in all directions and the contrast of the slices similar, and finally
+//! corrects the band variances of cuts in all directions at once. [`Mode::Oriented`] uses one exemplar per axis. The
+//! table gives the root mean square of ln(band variance / that of the exemplar) and the mean Wasserstein distance of
+//! bands (in standard deviations), over the slices and over the oblique cuts of 64³ in colour after 5 iterations, and
+//! processor seconds at 128³ on a busy 2020s server core:
 //!
 //! | | granite, slices | oblique | terrazzo, slices | oblique | seconds |
 //! |---|---|---|---|---|---|
@@ -28,12 +29,13 @@
 //! | slices, [`Cut::Axes`] | .001 / .008 | .025 / .018 | .007 / .012 | .013 / .022 | 9.8 |
 //! | slices | .001 / .009 | .002 / .010 | .002 / .010 | .003 / .012 | 13.7 |
 //!
-//! But for `Oriented` the volume is isotropic: orientations are pooled. Bands capture no long edges or letters, as in any Heeger-Bergen
-//! texture. Results have the same bits at any number of threads; between processor types the last bits may differ.
+//! Except in `Oriented` the volume is isotropic: orientations are pooled. Like every Heeger-Bergen texture, the result
+//! does not reproduce long edges or letters. Results have the same bits at any number of threads; between processor
+//! types the last bits may differ.
 //!
 //! # Examples
 //!
-//! A solid texture of the part of a photograph that a mask selects, here the binder between dark discs:
+//! A solid texture from the masked part of a photograph, here the binder between dark discs:
 //!
 //! ```
 //! use ndarray::{Array2, Array3};
@@ -47,11 +49,11 @@
 //! let exemplar = Exemplar::new(photo.view()).with_mask(binder.view());
 //! let options = TextureOptions::default().with_iterations(2).with_seed(1);
 //! let solid = synthesize_volume(&exemplar, [24, 24, 24], &options, &|_| ControlFlow::Continue(()))?;
-//! assert!(solid.iter().all(|&v| v > 0.45), "no trace of the discs");
+//! assert!(solid.iter().all(|&v| v > 0.45), "the discs leave no trace");
 //! # Ok::<(), stereology_pyramid::TextureError>(())
 //! ```
 //!
-//! How strong is an image at each scale and direction?
+//! The energy of an image at each scale and orientation:
 //!
 //! ```
 //! use ndarray::Array2;

@@ -1,17 +1,17 @@
-//! Histogram matching: values changed, order kept, so that they are distributed as a reference.
+//! Histogram matching: values are changed to the distribution of a reference, keeping their order.
 
 use rayon::prelude::*;
 
-/// Bins of the table of [`match_histogram_table`].
+/// Number of bins of the table of [`match_histogram_table`].
 const TABLE: usize = 4096;
-/// Values handed to a thread at a time.
+/// Number of values per task.
 const BLOCK: usize = 1 << 16;
-/// Values whose bins are found together.
+/// Number of values whose bins are computed together.
 const LANES: usize = 16;
-/// Tables that are counted apart.
+/// Number of tables that are counted separately.
 const PARTS: usize = 16;
 
-/// Values cannot be matched.
+/// Why values cannot be matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -21,12 +21,12 @@ pub enum MatchError {
     /// A value is NaN or infinite.
     #[error("value {index} is NaN or infinite")]
     NotFinite {
-        /// Its position.
+        /// Its index.
         index: usize,
     },
 }
 
-/// The distribution of a reference: its values in order.
+/// The distribution of a reference: its sorted values.
 ///
 /// # Examples
 ///
@@ -58,8 +58,8 @@ impl Quantiles {
         Ok(Self { sorted: values })
     }
 
-    /// Value below which the share `q` of the reference lies; the `i`-th of `m` values is that of `(i + 1/2) / m`, linear
-    /// between, constant beyond the ends.
+    /// Quantile `q` of the reference: the `i`-th of `m` values is the quantile `(i + 1/2) / m`, with linear
+    /// interpolation between and constant values beyond the ends.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "the position is clamped to the values")]
     pub fn at(&self, q: f64) -> f32 {
@@ -83,7 +83,7 @@ impl Quantiles {
         self.sorted.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() / self.sorted.len() as f64
     }
 
-    /// As many quantiles at most as `most`, evenly spaced; for references of millions of values.
+    /// At most `most` evenly spaced quantiles, for references of millions of values.
     pub(crate) fn reduced(self, most: usize) -> Self {
         if self.sorted.len() <= most {
             return self;
@@ -107,17 +107,17 @@ fn finite(values: &[f32]) -> Result<(), MatchError> {
         .map_or(Ok(()), |index| Err(MatchError::NotFinite { index }))
 }
 
-/// Gives `values` the distribution of `reference`, exactly: the value of rank `r` of `n` becomes the reference's quantile
-/// at `(r + 1/2) / n`. Equal values are ranked by position. With as many values as the reference, the result is a
-/// permutation of the reference. `O(n)`: the values are sorted by their digits.
+/// Matches `values` exactly to the distribution of `reference`: the value of rank `r` of `n` becomes the quantile `(r +
+/// 1/2) / n` of the reference. Equal values are ranked by position. If there are as many values as in the reference,
+/// the result is a permutation of the reference. `O(n)`: values are sorted by radix sort.
 ///
 /// # Errors
 ///
-/// [`MatchError::NotFinite`]; nothing is changed then.
+/// [`MatchError::NotFinite`]; then no value is changed.
 ///
 /// # References
 ///
-/// Heeger & Bergen 1995, section 3; ranks in place of their table as in Briand et al., IPOL 2014.
+/// Heeger & Bergen 1995, section 3; with ranks instead of their table, as in Briand et al., IPOL 2014.
 ///
 /// # Examples
 ///
@@ -135,13 +135,15 @@ pub fn match_histogram(values: &mut [f32], reference: &Quantiles) -> Result<(), 
     Ok(())
 }
 
-/// Gives `values` the distribution of `reference` by a table of 4096 bins over their range, linear within a bin: three to
-/// five times faster than [`match_histogram`], equal values stay equal. The result's distribution is off by what a bin of
-/// the range hides, under a thousandth of the standard deviation for any but extremely heavy tails. `O(n)`.
+/// Matches `values` to the distribution of `reference` by a table of 4096 bins over their range, linear within a bin.
+///
+/// Three to five times faster than [`match_histogram`]; equal values stay equal. The error of the distribution is
+/// limited by the width of a bin: below a thousandth of the standard deviation except for extremely heavy tails.
+/// `O(n)`.
 ///
 /// # Errors
 ///
-/// [`MatchError::NotFinite`]; nothing is changed then.
+/// [`MatchError::NotFinite`]; then no value is changed.
 ///
 /// # Examples
 ///
@@ -196,7 +198,7 @@ pub(crate) fn match_exactly(pieces: &mut [&mut [f32]], reference: &Quantiles) {
     }
 }
 
-/// Sorts keys by their upper halves, equal ones in the order they come: by digits from the last to the first.
+/// Radix sort of keys by their upper halves; equal keys keep their order.
 #[allow(clippy::cast_possible_truncation, reason = "digits are masked")]
 fn sorted_by_value(mut keys: Vec<u64>) -> Vec<u64> {
     const BITS: usize = 8;
@@ -216,22 +218,22 @@ fn sorted_by_value(mut keys: Vec<u64>) -> Vec<u64> {
             (*count, next) = (next, next + *count);
         }
         for &key in &keys {
-            let place = &mut counts[digit(key, pass)];
-            other[*place] = key;
-            *place += 1;
+            let position = &mut counts[digit(key, pass)];
+            other[*position] = key;
+            *position += 1;
         }
         std::mem::swap(&mut keys, &mut other);
     }
     keys
 }
 
-/// Bits of a number that compare as the number does; both zeros alike.
+/// Bits of a number that have the same order as the numbers; both zeros are equal.
 fn ordered_bits(value: f32) -> u32 {
     let bits = (value + 0.0).to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// What a table needs to know of values before it is made, and their power.
+/// Range and power of values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     pub(crate) lowest: f32,
@@ -247,7 +249,7 @@ impl Extent {
         power: 0.0,
     };
 
-    /// Of many values: one extent a block, joined in order.
+    /// Of many values: one extent per block, joined in order.
     pub(crate) fn of(values: &[f32]) -> Self {
         let blocks: Vec<Self> = values.par_chunks(BLOCK).map(Self::of_block).collect();
         blocks.into_iter().fold(Self::NOTHING, Self::with)
@@ -296,20 +298,20 @@ impl Extent {
     }
 }
 
-/// A map of values that brings one distribution to another: linear in each of [`TABLE`] bins.
+/// A map of values from one distribution to another, linear in each of [`TABLE`] bins.
 pub(crate) struct Table {
     lowest: f32,
     /// Bins per unit of value; zero for a constant.
     scale: f32,
-    /// Value at the lower edge of each bin, and how much more at the upper.
+    /// Value at the lower edge of each bin, and the increment to its upper edge.
     bins: Vec<[f32; 2]>,
 }
 
 impl Table {
-    /// For pieces of values, each times its factor, that have the `extent` together. A constant becomes the median.
+    /// For pieces of values, each multiplied by its factor, with the common `extent`. A constant becomes the median.
     pub(crate) fn new(pieces: &[(&[f32], f32)], extent: Extent, reference: &Quantiles) -> Self {
         let lowest = extent.lowest;
-        // A trace less than all bins, so that the highest value lies in the last.
+        // Slightly fewer than all bins, so that the highest value lies in the last bin.
         let scale = TABLE as f32 * (1.0 - 1e-6) / (extent.highest - lowest);
         if !(scale.is_finite() && scale > 0.0) {
             return Self {
@@ -358,7 +360,7 @@ impl Table {
         Self { lowest, scale, bins }
     }
 
-    /// Puts the values, times a factor, through the map.
+    /// Maps the values, multiplied by a factor.
     pub(crate) fn apply(&self, values: &mut [f32], factor: f32) {
         values.par_chunks_mut(BLOCK).for_each(|values| {
             if self.scale == 0.0 {
@@ -366,11 +368,11 @@ impl Table {
                 return;
             }
             for values in values.chunks_mut(LANES) {
-                let mut places = [(0, 0.0); LANES];
-                for (place, &v) in places.iter_mut().zip(values.iter()) {
-                    *place = bin(factor * v, self.lowest, self.scale);
+                let mut positions = [(0, 0.0); LANES];
+                for (position, &v) in positions.iter_mut().zip(values.iter()) {
+                    *position = bin(factor * v, self.lowest, self.scale);
                 }
-                for (v, &(i, part)) in values.iter_mut().zip(&places) {
+                for (v, &(i, part)) in values.iter_mut().zip(&positions) {
                     let [edge, step] = self.bins[(i as usize).min(TABLE - 1)];
                     *v = edge + part * step;
                 }
@@ -379,21 +381,21 @@ impl Table {
     }
 }
 
-/// As [`match_exactly`], by a table, for one piece.
+/// [`match_exactly`] by a table, for one piece.
 pub(crate) fn match_by_table(values: &mut [f32], reference: &Quantiles) {
     let table = Table::new(&[(values, 1.0)], Extent::of(values), reference);
     table.apply(values, 1.0);
 }
 
-/// Bin of a value, and how far it lies in it.
+/// Bin of a value, and its relative position in the bin.
 fn bin(value: f32, lowest: f32, scale: f32) -> (u32, f32) {
     whole_and_part((value - lowest) * scale)
 }
 
-/// Whole number at or below a number from 0 to 2^22, and what is left; a whole number may be taken for the one before and 1.
+/// Integer and fractional part of a number from 0 to 2^22; a whole number may be split into the one before and 1.
 ///
-/// Added to 2^23 a number is rounded, and the whole number stands in its last bits: unlike a conversion, that is done for several
-/// numbers at once.
+/// The sum with 2^23 is rounded to an integer, which is stored in its last bits. Unlike a conversion, this is
+/// vectorised.
 pub(crate) fn whole_and_part(number: f32) -> (u32, f32) {
     const WHOLE: f32 = 8_388_608.0;
     let below = if number > 0.5 { number - 0.5 } else { 0.0 };

@@ -1,11 +1,11 @@
-//! The bands on planes that lie obliquely to the volume's axes, given the exemplar's distributions.
+//! Matching of the bands on planes oblique to the axes of the volume.
 //!
-//! On the planes normal to n, a 2D pyramid is a family of 3D filters of the tangential frequency (see `cuts`). Their squares add
-//! up to one, so what is taken apart by them is put together by their conjugates, as on the slices along an axis.
+//! On the planes normal to n, a 2D pyramid is a family of 3D filters of the tangential frequency (see `cuts`). Their
+//! squares sum to one, so the conjugate filters reconstruct the volume, as on the slices along an axis.
 //!
-//! A band whose filter ends at the radius ρ fills a cylinder of frequencies about n. Along the axis a, the cylinder is
-//! 2ρ / √(1 − n_a²) thick, so samples that lie 1 / thickness apart along a hold all of it: its frequencies overlap nowhere when
-//! they are folded. Coarse bands so need a part of the samples only, along y and z, and along x if that lies in the planes.
+//! A band whose filter ends at radius ρ fills a cylinder of frequencies about n. Along axis a the cylinder is 2ρ / √(1
+//! − n_a²) thick, so samples at a distance of 1 / thickness along a represent it without aliasing. Coarse bands
+//! therefore need only a part of the samples along y and z, and along x if that axis lies in the planes.
 
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ use crate::cuts::Frame;
 use crate::filters::{Directions, band_response};
 use crate::targets::BandTargets;
 
-/// Steps of the tables of responses, over radii from 0 to 2.
+/// Number of steps of the tables of responses, for radii from 0 to 2.
 const STEPS: usize = 1 << 12;
 
 /// Tables and buffers of the oblique bands of volumes of one size.
@@ -26,10 +26,10 @@ pub(crate) struct Oblique {
     plane: Directions,
     /// Response of high-pass, levels, low-pass over the radius.
     tables: Vec<Vec<f32>>,
-    /// Of the oriented bands: the root, by the power of the cosine, of response times gain.
+    /// For the oriented bands: response times gain, to the power of 1 / (power of the cosine).
     roots: Vec<Vec<f32>>,
     full: Grid,
-    /// Smaller grids, made when a normal first asks for them.
+    /// Smaller grids, created when a normal first needs them.
     thinned: Vec<Grid>,
     spectrum: Vec<Complex<f32>>,
     sum: Vec<Complex<f32>>,
@@ -91,8 +91,8 @@ impl Oblique {
         }
     }
 
-    /// Gives the bands on the planes of one normal their targets. Returns `Σ ln²(variance / target)` before, and the number
-    /// of bands.
+    /// Matches the bands on the planes of one normal to their targets. Returns `Σ ln²(variance / target)` before
+    /// matching, and the number of bands.
     pub(crate) fn match_cuts(
         &mut self,
         field: &mut [f32],
@@ -163,7 +163,8 @@ impl Oblique {
     }
 }
 
-/// Samples along each axis (z, y, x) that hold the cylinder of frequencies about a normal whose radius is `ends` of Nyquist.
+/// Number of samples along each axis (z, y, x) that represent the cylinder of frequencies about a normal with radius
+/// `ends` of Nyquist.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -173,12 +174,13 @@ fn thinned(size: [usize; 3], normal: &Unit<Vector3<f64>>, ends: f64) -> [usize; 
     let along = [normal.z, normal.y, normal.x];
     let mut small = [0, 1, 2].map(|axis| {
         let across = (1.0 - along[axis] * along[axis]).sqrt();
-        // One more: the ends of the cylinder, where the filter is zero, may fall upon one another, but not be taken for Nyquist.
+        // Larger by one: the ends of the cylinder, where the filter is zero, may coincide, but must not fall on the
+        // Nyquist frequency.
         let fewest = (size[axis] as f64 * ends / across.max(1e-9)).ceil() as usize + 2;
         (fewest..size[axis]).find(|&n| is_smooth(n)).unwrap_or(size[axis])
     });
-    // The last axis keeps half of its frequencies, which cannot be folded, and of two axes at right angles to which no wave of the
-    // cylinder is long, only one can be thinned.
+    // The spectrum has only half of the frequencies of the last axis, which cannot be folded unless the axis lies in
+    // the planes; then only one of y and x can be reduced.
     if along[2].abs() > 1e-12 {
         small[2] = size[2];
     } else {
@@ -212,7 +214,7 @@ struct Filter<'a> {
     frame: Frame,
     /// Radius beyond which there is no response.
     ends: f64,
-    /// What all orientations have in common, on the large grid: the response, or its root over the radius.
+    /// The factor common to all orientations, on the large grid: the response, or its root divided by the radius.
     radial: &'a mut [f32],
 }
 
@@ -220,7 +222,7 @@ impl Filter<'_> {
     fn fill_radial(&mut self, table: &[f32], over_radius: bool) {
         let size = self.large;
         let (half, n) = (size[2] / 2 + 1, self.frame.normal);
-        // A bin at the Nyquist frequency of an axis stands for both signs: see `cuts`.
+        // A bin at the Nyquist frequency of an axis represents both signs: see `cuts`.
         let oblique = |along: f64| along.abs() < 1.0 - 1e-12;
         let frame = &self.frame;
         let ends = self.ends;
@@ -243,7 +245,7 @@ impl Filter<'_> {
         });
     }
 
-    /// The filtered spectrum, folded upon a smaller grid.
+    /// The filtered spectrum, folded onto a smaller grid.
     fn take(&self, spectrum: &[Complex<f32>], bins: &mut [Complex<f32>], direction: Option<&Direction>) {
         let (large, small) = (self.large, self.small);
         let (half, small_half) = (large[2] / 2 + 1, small[2] / 2 + 1);
@@ -275,7 +277,7 @@ impl Filter<'_> {
             });
     }
 
-    /// Adds the transform of a band on the smaller grid, unfolded and filtered by the conjugate.
+    /// Unfolds the transform of a band on the smaller grid, filters it by the conjugate, and adds it.
     fn add(&self, sum: &mut [Complex<f32>], bins: &[Complex<f32>], direction: Option<&Direction>) {
         let (large, small) = (self.large, self.small);
         let (half, small_half) = (large[2] / 2 + 1, small[2] / 2 + 1);
@@ -342,7 +344,7 @@ impl Filter<'_> {
     }
 }
 
-/// A number along the bins of a row.
+/// A linear function along the bins of a row.
 #[derive(Clone, Copy)]
 struct Line {
     start: f32,
@@ -355,7 +357,7 @@ impl Line {
     }
 }
 
-/// Tangential frequency of the bins of a row along the frame's two directions, Nyquist 1.
+/// Tangential frequency of the bins of a row along the two directions of the frame, Nyquist 1.
 #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
 fn along_row(frame: &Frame, size: [usize; 3], z: usize, y: usize) -> [Line; 2] {
     let start = Vector3::new(0.0, frequency(y, size[1]), frequency(z, size[0]));
@@ -365,7 +367,7 @@ fn along_row(frame: &Frame, size: [usize; 3], z: usize, y: usize) -> [Line; 2] {
     })
 }
 
-/// The bins of a row whose tangential frequency is shorter than `ends`: κ² = a + 2 b x + c x² along it.
+/// The bins of a row whose tangential frequency is below `ends`: κ² = a + 2 b x + c x² along the row.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -395,7 +397,7 @@ fn row_range(frame: &Frame, ends: f64, size: [usize; 3], z: usize, y: usize) -> 
     first.min(end)..end
 }
 
-/// Where a bin of an axis of `large` samples falls among those of `small`.
+/// Index among `small` bins onto which a bin of an axis of `large` samples is folded.
 fn folded(k: usize, small: usize, large: usize) -> usize {
     if small == large {
         k
@@ -406,7 +408,7 @@ fn folded(k: usize, small: usize, large: usize) -> usize {
     }
 }
 
-/// The bins of an axis of `large` samples that fall upon a bin of `small`.
+/// The bins of an axis of `large` samples that are folded onto one of `small` bins.
 fn unfolded(k: usize, small: usize, large: usize) -> impl Iterator<Item = usize> {
     let whole = small == large;
     let (below, above) = (large.div_ceil(2), large - large.div_ceil(2));
@@ -437,10 +439,10 @@ mod tests {
     use crate::plan::white_noise;
     use crate::targets::BandTargets;
 
-    /// Where nothing is matched, the field comes back from its oblique bands, at odd and unequal sides: the filters' squares
-    /// add up to one and thinning loses nothing.
+    /// Without targets the field is reconstructed from its oblique bands, at odd and unequal sides: the squares of the
+    /// filters sum to one and the reduced grids lose nothing.
     #[test]
-    fn fields_come_back_from_their_oblique_bands() {
+    fn oblique_bands_reconstruct_the_field() {
         for (size, levels, orientations) in [
             ([16, 16, 16], 2, 4),
             ([19, 24, 33], 2, 4),
@@ -462,9 +464,9 @@ mod tests {
         }
     }
 
-    /// Noise that is smooth in all directions, smoothed once more along one, has its cuts brought back to their band variances.
+    /// The band variances of cuts of isotropic noise that was smoothed along one axis are restored.
     #[test]
-    fn variances_of_cuts_are_brought_where_they_are_wanted() {
+    fn band_variances_of_cuts_are_corrected() {
         let (n, levels) = (24, 2);
         let smoothed = |field: &[f32], stride: usize| -> Vec<f32> {
             let next = |i: usize| i / (stride * n) * stride * n + (i + stride) % (stride * n);

@@ -1,4 +1,4 @@
-//! What is settled before a synthesis starts: levels, memory, and the noise it starts from.
+//! Preparation of a synthesis: levels, memory, and initial noise.
 
 use ndarray::{Array, Dimension, IntoDimension};
 use rand::{RngExt, SeedableRng};
@@ -11,16 +11,16 @@ use crate::bank::{level_shape, most_levels};
 use crate::exemplar::Prepared;
 use crate::{Exemplar, Matching, Mode, TextureError, TextureOptions, TextureReport};
 
-/// Samples along the shortest side of the coarsest oriented bands that the default number of levels leaves.
+/// Number of samples along the shortest side of the coarsest oriented bands with the default number of levels.
 const COARSEST: usize = 16;
 
 pub(crate) struct Plan {
     pub(crate) levels: usize,
-    asked: Option<usize>,
+    requested: Option<usize>,
 }
 
 impl Plan {
-    /// Checks what needs no look at the pixels. `shape` is the result's.
+    /// Checks everything that does not depend on the pixels. `shape` is that of the result.
     pub(crate) fn new(
         exemplars: &[Exemplar<'_>],
         shape: &[usize],
@@ -58,21 +58,24 @@ impl Plan {
             .take_while(|&l| l == 1 || level_shape(&[shortest], &[], l - 1)[0] >= COARSEST)
             .count();
         Ok(Self {
-            levels: options.levels.map_or(usual, |asked| asked.min(most)),
-            asked: options.levels,
+            levels: options.levels.map_or(usual, |requested| requested.min(most)),
+            requested: options.levels,
         })
     }
 
     pub(crate) fn report(&self, exemplar: &Prepared) -> TextureReport {
         let mut findings = Vec::new();
-        if let Some(asked) = self.asked.filter(|&asked| asked > self.levels) {
-            let message = format!("{asked} levels are too many for these sizes: {} were used", self.levels);
+        if let Some(requested) = self.requested.filter(|&requested| requested > self.levels) {
+            let message = format!(
+                "{requested} levels are too many for these sizes: {} are used",
+                self.levels
+            );
             findings.push(Finding::new("levels-reduced", message));
         }
         if !exemplar.varies(0) {
             findings.push(Finding::new(
                 "constant-exemplar",
-                "the exemplar is one colour: so is the texture",
+                "the exemplar has a single colour, and so does the texture",
             ));
         }
         TextureReport {
@@ -85,9 +88,10 @@ impl Plan {
     }
 }
 
-/// Bytes a synthesis asks for at its peak, about: components, channels and the interleaved result; the coefficients of one
-/// component (of all, for an image) with their spectra; for a volume, the spectra that cuts are weighed by, and in
-/// [`Mode::Slices`] those of an oblique band; and two lists of places for each band that is sorted at the same time.
+/// Approximate peak memory of a synthesis in bytes: components, channels and the interleaved result; the coefficients
+/// of one component (of all, for an image) with their spectra; for a volume, the spectra of the correction of cuts, and
+/// in [`Mode::Slices`] those of an oblique band; and two lists of indices for each band that is sorted at the same
+/// time.
 fn bytes_needed(shape: &[usize], channels: usize, options: &TextureOptions) -> u128 {
     let samples = shape.iter().fold(1_u128, |all, &n| all.saturating_mul(n as u128));
     let colours = 3 * channels as u128;
@@ -104,7 +108,8 @@ fn bytes_needed(shape: &[usize], channels: usize, options: &TextureOptions) -> u
     samples.saturating_mul(4 * (colours + floats))
 }
 
-/// Gaussian noise of unit variance: one random stream a row of `row` samples, so that any thread can make any row.
+/// Gaussian noise of unit variance, with one random stream per row of `row` samples, so that rows are independent of
+/// threads.
 pub(crate) fn white_noise(samples: usize, row: usize, seed: u64, component: usize) -> Vec<f32> {
     let mut noise = vec![0.0_f32; samples];
     noise.par_chunks_mut(row).enumerate().for_each(|(i, row)| {
@@ -115,13 +120,13 @@ pub(crate) fn white_noise(samples: usize, row: usize, seed: u64, component: usiz
     noise
 }
 
-/// Root of the mean over all bands of sums of squares.
+/// Root mean square over all bands, from sums of squares and numbers of bands.
 pub(crate) fn root_mean_square(errors: &[(f64, usize)]) -> f64 {
     let (sum, n) = errors.iter().fold((0.0, 0), |(sum, n), &(s, m)| (sum + s, n + m));
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
-/// The finished values as an array.
+/// The values as an array.
 pub(crate) fn shaped<I: IntoDimension>(shape: I, values: Vec<f32>) -> Array<f32, I::Dim> {
     let shape = shape.into_dimension();
     debug_assert_eq!(shape.size(), values.len());

@@ -1,6 +1,6 @@
-//! Why an image or a volume cannot be taken apart.
+//! Errors of the pyramids.
 
-/// An image cannot be taken apart as asked.
+/// Why an image or a volume cannot be decomposed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PyramidError {
@@ -12,65 +12,65 @@ pub enum PyramidError {
         /// Columns.
         width: usize,
     },
-    /// The image is too small for so many levels, or none were asked for.
-    #[error("a pyramid of {height} x {width} pixels has 1 to {most} levels, not {asked}")]
+    /// The image is too small for this number of levels, or the number is zero.
+    #[error("a pyramid of {height} x {width} pixels has 1 to {most} levels, not {requested}")]
     Levels {
         /// Rows.
         height: usize,
         /// Columns.
         width: usize,
-        /// Levels asked for.
-        asked: usize,
-        /// Most levels possible.
+        /// Requested levels.
+        requested: usize,
+        /// Largest possible number of levels.
         most: usize,
     },
     /// The number of orientations is out of range.
-    #[error("a pyramid has 1 to 32 orientations, not {asked}")]
+    #[error("a pyramid has 1 to 32 orientations, not {requested}")]
     Orientations {
-        /// Orientations asked for.
-        asked: usize,
+        /// Requested orientations.
+        requested: usize,
     },
     /// A distance between samples is not positive, or one is more than 64 times another.
-    #[error("distances between samples must be positive and alike within a factor of 64, not {spacing:?}")]
+    #[error("distances between samples must be positive and differ by at most a factor of 64, not {spacing:?}")]
     Spacing {
-        /// Distances given, an axis each.
+        /// Given distances, one per axis.
         spacing: Vec<f64>,
     },
-    /// The volume is too small for so many levels, or none were asked for.
+    /// The volume is too small for this number of levels, or the number is zero.
     #[error(
-        "a pyramid of a volume of {shape:?} samples has 1 to {most} levels, not {asked}; each side needs at least 8"
+        "a pyramid of a volume of {shape:?} samples has 1 to {most} levels, not {requested}; each side needs at least 8"
     )]
     VolumeLevels {
         /// Samples along z, y, x.
         shape: [usize; 3],
-        /// Levels asked for.
-        asked: usize,
-        /// Most levels possible.
+        /// Requested levels.
+        requested: usize,
+        /// Largest possible number of levels.
         most: usize,
     },
-    /// The volume has another shape than the pyramid was made for.
-    #[error("this pyramid was made for {expected:?} samples (z, y, x), but the volume has {found:?}")]
+    /// The volume does not have the shape of the pyramid.
+    #[error("this pyramid is for {expected:?} samples (z, y, x), but the volume has {found:?}")]
     VolumeShape {
-        /// Samples the pyramid was made for.
+        /// Samples of the pyramid.
         expected: [usize; 3],
         /// Samples of the volume.
         found: [usize; 3],
     },
-    /// The volume holds NaN or infinity.
+    /// The volume contains NaN or infinity.
     #[error("the sample at {at:?} (z, y, x) is NaN or infinite")]
     VolumeNotFinite {
         /// Position of the sample.
         at: [usize; 3],
     },
-    /// The image has another shape than the pyramid was made for.
-    #[error("this pyramid was made for {expected:?} pixels (rows, columns), but the image has {found:?}")]
+    /// The image does not have the shape of the pyramid.
+    #[error("this pyramid is for {expected:?} pixels (rows, columns), but the image has {found:?}")]
     Shape {
-        /// Rows and columns the pyramid was made for.
+        /// Rows and columns of the pyramid.
         expected: [usize; 2],
         /// Rows and columns of the image.
         found: [usize; 2],
     },
-    /// The image holds NaN or infinity.
+    /// The image contains NaN or infinity.
     #[error("the pixel at row {row}, column {column} is NaN or infinite")]
     NotFinite {
         /// Row of the pixel.

@@ -1,15 +1,16 @@
-//! Band variances of the cuts of all directions, made right at once by a change of the power of the volume's waves.
+//! Correction of the band variances of cuts in all directions at once, by a change of the power of the volume's waves.
 //!
-//! Every wave shows on the planes of every normal, each time at another tangential frequency κ_n, so what is changed for the slices
-//! along an axis changes the cuts along the diagonals too. The power that gives the planes of thirteen normals (axes, face and
-//! space diagonals) all the band variances wanted, and is else as near as can be to the one there is:
+//! Every wave appears on the planes of every normal, each time with another tangential frequency κ_n, so a change for
+//! the slices along an axis also changes the cuts along the diagonals. The power closest to the present one that gives
+//! the planes of thirteen normals (axes, face and space diagonals) all target band variances is:
 //!
 //! ```text
 //! P(k) ← P(k) exp(Σ_n Σ_b λ_nb G_b²(κ_n))        minimal Σ P' ln(P'/P) − P' + P under Σ_k P' G_b²(κ_n) = wanted_b
 //! ```
 //!
-//! λ is found by Newton's method: the gradient is wanted − found, the Hessian Σ_k P G_b²(κ_n) G_c²(κ_m). The Hessian hardly
-//! changes with P, so it is summed up once for three steps, over one row of waves in four and all of the coarsest (see `wave_change`).
+//! λ is found by Newton's method: the gradient is wanted − found, the Hessian Σ_k P G_b²(κ_n) G_c²(κ_m). The Hessian
+//! hardly changes with P, so it is summed once for three steps, over one row of waves in four and all of the coarsest
+//! (see `wave_change`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -17,23 +18,23 @@ use rayon::prelude::*;
 use crate::cuts::{Cuts, STEPS, thirteen_normals};
 use crate::wave_change::Change;
 
-/// Newton's steps at most.
+/// Maximum number of Newton steps.
 const MOST_STEPS: usize = 9;
-/// Steps after which the Hessian is summed up anew.
+/// Number of steps after which the Hessian is recomputed.
 const STEPS_OF_HESSIAN: usize = 3;
-/// Largest ln(variance / wanted) that is let be.
-const NEAR_ENOUGH: f64 = 1e-3;
-/// Part of the Hessian's diagonal added to it, for bands that say the same.
+/// Tolerance of ln(variance / wanted).
+const TOLERANCE: f64 = 1e-3;
+/// Fraction of the diagonal of the Hessian that is added to it, because bands can be linearly dependent.
 const DAMPING: f64 = 1e-5;
 
-/// How the band variances of one field answer to a change of λ: the factored Hessian, scaled to a diagonal of one.
+/// Response of the band variances of one field to a change of λ: the factored Hessian, scaled to a unit diagonal.
 pub(crate) struct Curvature {
     scale: DVector<f64>,
     factored: Cholesky<f64, Dyn>,
 }
 
 impl Curvature {
-    /// Of the lower triangle of the Hessian, by rows.
+    /// From the lower triangle of the Hessian, by rows.
     fn new(lower: Vec<f64>, unknowns: usize) -> Option<Self> {
         let mut hessian = DMatrix::from_row_slice(unknowns, unknowns, &lower);
         let scale = hessian.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
@@ -58,8 +59,9 @@ impl Curvature {
 }
 
 impl Cuts {
-    /// Gives the cuts along the axes, face diagonals and space diagonals the band variances wanted (high-pass, levels, low-pass;
-    /// zero where none is). `known` is kept for the next call with a field of nearly the same spectrum. `O(N log N)`.
+    /// Gives the cuts along the axes, face diagonals and space diagonals the wanted band variances (high-pass, levels,
+    /// low-pass; zero without a target). `known` is reused by the next call with a field of nearly the same spectrum.
+    /// `O(N log N)`.
     #[allow(clippy::cast_possible_truncation, reason = "kept in f32")]
     pub(crate) fn reweight(&mut self, field: &mut [f32], wanted: &[f64], known: &mut Option<Curvature>) {
         let normals = thirteen_normals();
@@ -100,13 +102,13 @@ impl Cuts {
                     }
                 })
                 .collect();
-            if ratios.iter().all(|ratio| ratio.ln().abs() < NEAR_ENOUGH) {
+            if ratios.iter().all(|ratio| ratio.ln().abs() < TOLERANCE) {
                 break;
             }
             let lambda = curvature.solve(&DVector::from_fn(unknowns, |i, _| {
                 (ratios[i].clamp(0.5, 2.0) - 1.0) * found[i]
             }));
-            // Half of it, since amplitudes are multiplied.
+            // Half, since amplitudes are multiplied.
             let log = |n: usize, i: usize| {
                 let of_bands = self.tables.iter().enumerate();
                 of_bands

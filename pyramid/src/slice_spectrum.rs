@@ -1,18 +1,18 @@
-//! What the spectrum of a volume and the spectrum of its slices have to do with each other.
+//! The relation between the spectrum of a volume and the spectrum of its slices.
 //!
-//! A slice sees all waves of the volume that run along its normal at once:
+//! At each frequency a slice contains the sum of all waves of the volume with any frequency along its normal:
 //!
 //! ```text
 //! S2(κ) = ∫ S3(√(κ² + k_z²)) dk_z = 2 ∫_κ^∞ S3(k) k dk / √(k² − κ²)      (Abel's transform; cycles per sample)
 //! ```
 //!
-//! A volume whose own spectrum is that of a photograph therefore has slices that are too smooth; the volume's spectrum
-//! must be the inverse of this relation, as far as a spectrum, never negative, can be.
+//! A volume with the spectrum of a photograph therefore has slices that are too smooth. Its spectrum must be the
+//! inverse of this relation, as closely as a spectrum, which is never negative, can be.
 
 use nalgebra::{DMatrix, DVector};
 use stereology_spectrum::RadialSpectrum;
 
-/// Steps of the quadrature over half the frequency range.
+/// Number of steps of the quadrature over half the frequency range.
 const STEPS: usize = 256;
 
 /// Spectrum at frequency `kappa` of the slices of an isotropic sampled volume with spectrum `volume`, both in units of
@@ -20,7 +20,7 @@ const STEPS: usize = 256;
 ///
 /// # Examples
 ///
-/// A Gaussian gives a Gaussian:
+/// A Gaussian volume spectrum gives a Gaussian slice spectrum:
 ///
 /// ```
 /// use stereology_pyramid::slice_spectrum;
@@ -39,15 +39,15 @@ fn normal_frequencies() -> impl Iterator<Item = f64> {
     (0..STEPS).map(|i| 0.5 * (i as f64 + 0.5) / STEPS as f64)
 }
 
-/// A radial spectrum of a volume, linear between its nodes: made by [`volume_spectrum`].
+/// A radial spectrum of a volume, linear between nodes, computed by [`volume_spectrum`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct VolumeSpectrum {
     /// Frequencies of the nodes, cycles per sample, evenly spaced.
     pub frequency: Vec<f64>,
     /// Power at the nodes, `|F|² / N`, never negative.
     pub power: Vec<f64>,
-    /// Root mean square of the relative differences between the slices' spectrum and the one asked for, weighted by the
-    /// frequencies in each bin: what no spectrum of a volume can give.
+    /// Root mean square of the relative differences between the spectrum of the slices and the requested one, weighted
+    /// by the number of frequencies in each bin: the part that no spectrum of a volume can give.
     pub residual: f64,
 }
 
@@ -60,7 +60,8 @@ impl VolumeSpectrum {
     }
 }
 
-/// Node below a frequency and the part of the way to the next, for nodes at `(i + 1/2) width`, `first = width / 2`.
+/// Node below a frequency and the fraction of the interval to the next, for nodes at `(i + 1/2) width`, `first = width
+/// / 2`.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -71,8 +72,8 @@ fn node(frequency: f64, first: f64, count: usize) -> (usize, f64) {
     (position as usize, position.fract())
 }
 
-/// Spectrum of the isotropic volume whose slices have the spectrum `slice`, as nearly as a spectrum that is never negative
-/// can: non-negative least squares of the relative differences. `O(bins³)`.
+/// Spectrum of the isotropic volume whose slices have the spectrum `slice`, as closely as a non-negative spectrum can:
+/// non-negative least squares of the relative differences. `O(bins³)`.
 ///
 /// # Examples
 ///
@@ -80,7 +81,7 @@ fn node(frequency: f64, first: f64, count: usize) -> (usize, f64) {
 /// use stereology_pyramid::{slice_spectrum, volume_spectrum};
 /// use stereology_spectrum::RadialSpectrum;
 ///
-/// // Slices of the Gaussian volume of `slice_spectrum`, and the volume back from them.
+/// // From the slices of the Gaussian volume of `slice_spectrum` back to the volume.
 /// let volume = |k: f64| (-0.5 * (k / 0.08).powi(2)).exp();
 /// let frequency: Vec<f64> = (0..46).map(|i| (i as f64 + 0.5) / 64.0).collect();
 /// let power = frequency.iter().map(|&k| slice_spectrum(&volume, k)).collect();
@@ -102,9 +103,9 @@ pub fn volume_spectrum(slice: &RadialSpectrum) -> VolumeSpectrum {
     let first = slice.frequency[0];
     let frequencies: f64 = slice.count.iter().map(|&c| c as f64).sum();
     let mut relation = DMatrix::zeros(n, n);
-    let mut asked = DVector::zeros(n);
+    let mut requested = DVector::zeros(n);
     for i in 0..n {
-        // Relative differences count, but a bin far below the strongest cannot be held to its own scale.
+        // Relative differences are weighted, with a floor for bins far below the strongest.
         let scale = slice.power[i].max(1e-7 * strongest);
         let weight = (slice.count[i] as f64 / frequencies).sqrt() / scale;
         for k in normal_frequencies() {
@@ -112,10 +113,10 @@ pub fn volume_spectrum(slice: &RadialSpectrum) -> VolumeSpectrum {
             relation[(i, j)] += weight * (1.0 - part) / STEPS as f64;
             relation[(i, (j + 1).min(n - 1))] += weight * part / STEPS as f64;
         }
-        asked[i] = weight * slice.power[i];
+        requested[i] = weight * slice.power[i];
     }
-    let power = non_negative_least_squares(&relation, &asked);
-    let residual = (&relation * &power - &asked).norm();
+    let power = non_negative_least_squares(&relation, &requested);
+    let residual = (&relation * &power - &requested).norm();
     VolumeSpectrum {
         frequency: slice.frequency.clone(),
         power: power.iter().copied().collect(),
@@ -150,7 +151,7 @@ fn non_negative_least_squares(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64
                 columns.iter().zip(solution.iter()).for_each(|(&j, &v)| x[j] = v);
                 break;
             }
-            // Go as far towards the solution as stays non-negative, and fix what has reached zero.
+            // Move towards the solution as far as all components stay non-negative, and fix those that reach zero.
             let blocking = columns.iter().zip(solution.iter()).filter(|(_, v)| **v <= 0.0);
             let (first, step) = blocking
                 .map(|(&j, &v)| (j, x[j] / (x[j] - v)))

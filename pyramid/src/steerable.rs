@@ -1,4 +1,4 @@
-//! The steerable pyramid of an image: what it holds at every scale and in every direction, and the image back from it.
+//! The steerable pyramid of images: decomposition into scales and orientations, and reconstruction.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use crate::bands::Bands;
 use crate::bank::{FilterBank, most_levels};
 use crate::filters::Directions;
 
-/// The steerable pyramid of images of one shape: its filters, made once.
+/// The steerable pyramid of images of one shape, with its filters.
 ///
-/// Images are taken as periodic; edges are the caller's concern
-/// ([`periodic_component`](stereology_spectrum::periodic_component)). Any size from 8 x 8, odd and non-square included.
-/// Reconstruction is exact: below 1e-12 of the range in `f64`, below 2e-6 in `f32`. Building and reconstructing cost
-/// `O(K N log N)`; the filters hold about `2/3 K N` numbers for `K` orientations.
+/// Images are assumed to be periodic; the caller treats edges
+/// ([`periodic_component`](stereology_spectrum::periodic_component)). Any size from 8 x 8, including odd and non-square
+/// sizes. Reconstruction is exact: below 1e-12 of the range in `f64`, below 2e-6 in `f32`. Building and reconstructing
+/// cost `O(K N log N)`; the filters hold about `2/3 K N` numbers for `K` orientations.
 ///
 /// # Formula
 ///
 /// ```text
-/// band(l, b) = Re FT⁻¹[ L_1 L_½ … H_{2^−(l+1)} A_b û ] on the grid of level l, ceil(n/2) samples an axis from level to level
+/// band(l, b) = Re FT⁻¹[ L_1 L_½ … H_{2^−(l+1)} A_b û ] on the grid of level l, with ceil(n/2) samples per axis on the next
 /// Σ_l (N_0/N_l) |c_l|² = |u|²                         Parseval: N_l samples of level l, coefficients without gain
 /// ```
 ///
@@ -46,24 +46,24 @@ use crate::filters::Directions;
 #[derive(Clone, Debug)]
 pub struct SteerablePyramid<T: Real> {
     bank: Arc<FilterBank<T>>,
-    /// The filters a quarter of a wave apart.
+    /// Filters in quadrature with those of `bank`.
     partner: Arc<FilterBank<T>>,
     gain: Gain,
 }
 
-/// How the coefficients of coarser levels are scaled.
+/// Scaling of the coefficients of coarser levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gain {
-    /// Not at all: a constant image has its value in the low-pass, and `Σ (N_0/N_l) |c_l|²` is the image's `|u|²`.
+    /// No scaling: a constant image has its value in the low-pass, and `Σ (N_0/N_l) |c_l|²` equals `|u|²` of the image.
     #[default]
     None,
-    /// By `N_0/N_l`, the samples of the image over those of the level (4 to the power of the level where sizes halve exactly),
-    /// as pyrtools' `SteerablePyramidFreq` has them.
+    /// By `N_0/N_l`, the number of samples of the image divided by that of the level (4 to the power of the level where
+    /// sizes halve exactly), as in `SteerablePyramidFreq` of pyrtools.
     Pyrtools,
 }
 
 impl<T: Real> SteerablePyramid<T> {
-    /// Pyramid of images of `shape` (rows, columns). One orientation makes the isotropic pyramid.
+    /// Pyramid of images of `shape` (rows, columns). With one orientation the pyramid is isotropic.
     ///
     /// # Errors
     ///
@@ -73,13 +73,14 @@ impl<T: Real> SteerablePyramid<T> {
         Self::with_spacing(shape, [1.0; 2], levels, orientations)
     }
 
-    /// Pyramid of images whose rows and columns lie `spacing` apart (rows, columns; any unit): scales and angles are then those
-    /// of the object, not of the array. Level 0 is the octave below the Nyquist frequency of the finer spacing; the axis of
-    /// the wider one keeps its samples until a level's frequencies leave it fewer.
+    /// Pyramid of images with distances `spacing` between rows and columns (rows, columns; any unit): scales and angles
+    /// are those of the object, not of the array. Level 0 is the octave below the Nyquist frequency of the finer
+    /// spacing; the axis with the wider spacing keeps its samples until the frequencies of a level need fewer.
     ///
     /// # Errors
     ///
-    /// As [`Self::new`]; [`PyramidError::Spacing`] for spacings that are not positive or differ by more than a factor of 64.
+    /// As [`Self::new`]; [`PyramidError::Spacing`] for spacings that are not positive or differ by more than a factor
+    /// of 64.
     ///
     /// # Examples
     ///
@@ -87,7 +88,7 @@ impl<T: Real> SteerablePyramid<T> {
     /// use ndarray::Array2;
     /// use stereology_pyramid::SteerablePyramid;
     ///
-    /// // Slices 3 µm apart, pixels of 1 µm: a wave at 45 degrees of the object shows in orientation 1 of 4.
+    /// // Slices at distances of 3 µm with pixels of 1 µm: a wave at 45 degrees of the object appears in orientation 1 of 4.
     /// let wave = Array2::from_shape_fn((32, 96), |(y, x)| (std::f64::consts::TAU * (3.0 * y as f64 + x as f64) / 12.0).cos());
     /// let pyramid = SteerablePyramid::with_spacing([32, 96], [3.0, 1.0], 3, 4)?;
     /// let bands = pyramid.build(wave.view())?;
@@ -113,12 +114,14 @@ impl<T: Real> SteerablePyramid<T> {
             return Err(PyramidError::Levels {
                 height,
                 width,
-                asked: levels,
+                requested: levels,
                 most,
             });
         }
         if orientations == 0 || orientations > 32 {
-            return Err(PyramidError::Orientations { asked: orientations });
+            return Err(PyramidError::Orientations {
+                requested: orientations,
+            });
         }
         let plane = Directions::plane(orientations);
         Ok(Self {
@@ -128,15 +131,15 @@ impl<T: Real> SteerablePyramid<T> {
         })
     }
 
-    /// With another gain of the coefficients.
+    /// Sets the gain of the coefficients.
     #[must_use]
     pub fn with_gain(mut self, gain: Gain) -> Self {
         self.gain = gain;
         self
     }
 
-    /// Most levels of an image of `shape`: its coarsest bands still have 8 samples along the shorter side; zero if the
-    /// image has not.
+    /// Largest number of levels of an image of `shape`: its coarsest bands have at least 8 samples along the shorter
+    /// side; zero if the image has fewer.
     ///
     /// # Examples
     ///
@@ -169,7 +172,7 @@ impl<T: Real> SteerablePyramid<T> {
         self.bank.orientations()
     }
 
-    /// Takes an image apart.
+    /// Decomposes an image into bands.
     ///
     /// # Errors
     ///
@@ -179,8 +182,8 @@ impl<T: Real> SteerablePyramid<T> {
         Ok(self.bands_of(&values, &self.bank))
     }
 
-    /// Takes an image apart into complex bands, whose real parts are those of [`Self::build`] and whose imaginary parts are a
-    /// quarter of a wave apart: the modulus is the local amplitude, the argument the local phase.
+    /// Decomposes an image into complex bands, whose real parts are those of [`Self::build`] and whose imaginary parts
+    /// are in quadrature: the modulus is the local amplitude, the argument the local phase.
     ///
     /// # Errors
     ///
@@ -220,18 +223,17 @@ impl<T: Real> SteerablePyramid<T> {
         bands
     }
 
-    /// The image of a pyramid's bands, changed or not.
+    /// Reconstructs an image from bands, which are assumed to have the gain of this pyramid.
     ///
     /// # Panics
     ///
-    /// If the bands are those of a pyramid of another shape, other levels or orientations. The bands are taken to have this
-    /// pyramid's gain.
+    /// If the bands belong to a pyramid with another shape, levels or orientations.
     #[must_use]
     pub fn reconstruct(&self, bands: &Bands<T>) -> Array2<T> {
         assert_eq!(
             self.bank.ranges(),
             bands.bank.ranges(),
-            "the bands are of another pyramid"
+            "the bands belong to another pyramid"
         );
         let mut image = vec![T::zero(); self.shape().iter().product()];
         let mut work = self.bank.work();
@@ -246,7 +248,7 @@ impl<T: Real> SteerablePyramid<T> {
     }
 }
 
-/// Spacings that a pyramid can have.
+/// Checks that spacings are positive and differ by at most a factor of 64.
 pub(crate) fn check_spacing(spacing: &[f64]) -> Result<(), PyramidError> {
     let positive = spacing.iter().all(|s| *s > 0.0 && s.is_finite());
     let finest = spacing.iter().copied().fold(f64::INFINITY, f64::min);

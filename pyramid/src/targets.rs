@@ -1,4 +1,4 @@
-//! The distributions that the bands of a texture are given.
+//! Target distributions of the bands of a texture.
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use crate::filters::{Directions, band_response};
 /// Target distributions of the bands of one component.
 pub(crate) struct BandTargets {
     pub(crate) targets: Vec<Quantiles>,
-    /// Target of each band; none for one that is left as it is.
+    /// Target of each band; none for a band that is not changed.
     pub(crate) of_band: Vec<Option<usize>>,
 }
 
@@ -28,7 +28,7 @@ impl BandTargets {
         })
     }
 
-    /// The low-pass left as it is.
+    /// Without a target for the low-pass.
     pub(crate) fn without_low(mut self) -> Self {
         if let Some(last) = self.of_band.last_mut() {
             *last = None;
@@ -36,7 +36,7 @@ impl BandTargets {
         self
     }
 
-    /// Mean squares of the high-pass and of each level, its `orientations` added up; the variance of the low-pass.
+    /// Mean squares of the high-pass and of each level (sum over its `orientations`); variance of the low-pass.
     pub(crate) fn level_mean_squares(&self, orientations: usize) -> Vec<f64> {
         let of = |band: &Option<usize>| band.map_or(0.0, |target| self.targets[target].mean_square());
         let (high, rest) = self.of_band.split_at(1);
@@ -56,7 +56,7 @@ pub(crate) enum Pooling {
     Together,
 }
 
-/// Bands of the components, each coefficient with the share of its filter's energy that falls on the mask.
+/// Bands of the components, and the coefficients whose filters lie sufficiently inside the mask.
 pub(crate) struct Analysis {
     bank: FilterBank<f32>,
     /// For each level (high-pass, levels, low-pass): whether a sample counts.
@@ -74,8 +74,8 @@ impl Analysis {
                 let Some(mask) = view.mask.as_ref() else {
                     return view.mirrored().then(|| original_quarter(shape));
                 };
-                let shares = filter_shares(mask, i, levels, shape);
-                let (mut counted, least) = enough(&shares);
+                let fractions = filter_fractions(mask, i, levels, shape);
+                let (mut counted, least) = enough(&fractions);
                 if view.mirrored() {
                     let quarter = original_quarter(shape);
                     counted
@@ -90,8 +90,8 @@ impl Analysis {
                         i => format!("level {}", i - 1),
                     };
                     let message = format!(
-                        "the mask's regions are small for {name} of the pyramid: samples were used of which only \
-                         {:.0} % lie in the mask",
+                        "the regions of the mask are small for {name} of the pyramid: samples with only {:.0} % of their \
+                         filter inside the mask were used",
                         100.0 * least
                     );
                     findings.push(Finding::new("few-samples", message));
@@ -112,7 +112,7 @@ impl Analysis {
         self.bank.analyse(field, &mut coefficients, &mut self.bank.work());
         let (levels, count) = (self.bank.level_count(), self.bank.orientations());
         let ranges = self.bank.ranges();
-        // The bands that share a target, and the level whose mask they share.
+        // Bands that share a target, and the level of their mask.
         let groups: Vec<(usize, Vec<usize>)> = [(0, vec![0])]
             .into_iter()
             .chain((0..levels).flat_map(|l| {
@@ -148,7 +148,7 @@ impl Analysis {
     }
 }
 
-/// The samples of a level of a mirrored exemplar that lie over the exemplar itself.
+/// The samples of a level of a mirrored exemplar that lie in the original quarter.
 fn original_quarter(shape: &[usize]) -> Vec<bool> {
     let half = |n: usize| n.div_ceil(2);
     (0..shape[0])
@@ -157,8 +157,8 @@ fn original_quarter(shape: &[usize]) -> Vec<bool> {
         .collect()
 }
 
-/// For each sample of a level, the share of its filter's energy that falls on the mask.
-fn filter_shares(mask: &Array2<bool>, i: usize, levels: usize, shape: &[usize]) -> Vec<f64> {
+/// For each sample of a level, the fraction of the energy of its filter that lies on the mask.
+fn filter_fractions(mask: &Array2<bool>, i: usize, levels: usize, shape: &[usize]) -> Vec<f64> {
     let (height, width) = mask.dim();
     let fft = RealFft::<f64>::new(&[height, width]).expect("a checked mask");
     let kernel = Array2::from_shape_fn((height, width / 2 + 1), |(y, x)| {
@@ -171,26 +171,26 @@ fn filter_shares(mask: &Array2<bool>, i: usize, levels: usize, shape: &[usize]) 
     let on_mask = mask.mapv(|m| if m { 1.0 } else { 0.0 });
     let spectrum = fft.forward(on_mask.view()).expect("the planned shape")
         * fft.forward(energy.view()).expect("the planned shape");
-    let share = fft.inverse(spectrum).expect("the planned shape");
+    let fraction = fft.inverse(spectrum).expect("the planned shape");
     let nearest = |i: usize, level: usize, full: usize| (2 * i * full + level) / (2 * level) % full;
     (0..shape[0])
         .flat_map(|y| (0..shape[1]).map(move |x| (y, x)))
-        .map(|(y, x)| share[[nearest(y, shape[0], height), nearest(x, shape[1], width)]] / total)
+        .map(|(y, x)| fraction[[nearest(y, shape[0], height), nearest(x, shape[1], width)]] / total)
         .collect()
 }
 
-/// The samples that lie well inside the mask, by the strictest of a few limits that leaves enough of them, and that limit.
-fn enough(shares: &[f64]) -> (Vec<bool>, f64) {
-    let inside = shares.iter().filter(|&&s| s >= 0.5).count();
-    let needed = (inside / 4).max(FEWEST_PIXELS.min(shares.len() / 8)).max(1);
+/// The samples inside the mask by the strictest limit of the fraction that leaves enough of them, and that limit.
+fn enough(fractions: &[f64]) -> (Vec<bool>, f64) {
+    let inside = fractions.iter().filter(|&&s| s >= 0.5).count();
+    let needed = (inside / 4).max(FEWEST_PIXELS.min(fractions.len() / 8)).max(1);
     let limit = [0.98, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1]
         .into_iter()
-        .find(|&limit| shares.iter().filter(|&&s| s >= limit).count() >= needed)
+        .find(|&limit| fractions.iter().filter(|&&s| s >= limit).count() >= needed)
         .unwrap_or(0.0);
     let limit = if limit > 0.0 {
         limit
     } else {
-        shares.iter().copied().fold(0.0, f64::max)
+        fractions.iter().copied().fold(0.0, f64::max)
     };
-    (shares.iter().map(|&s| s >= limit).collect(), limit)
+    (fractions.iter().map(|&s| s >= limit).collect(), limit)
 }

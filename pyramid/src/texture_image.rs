@@ -12,18 +12,20 @@ use crate::plan::{Plan, root_mean_square, shaped, white_noise};
 use crate::targets::{Analysis, Pooling};
 use crate::{TextureError, TextureOptions, TextureReport, Watch};
 
-/// An image of any size that looks like the exemplar, and repeats without a seam.
+/// Synthesises an image of any size that looks like the exemplar and is periodic without a seam.
 ///
-/// White noise gets the exemplar's distribution of colours and of the bands of its steerable pyramid, in turns; the colours
-/// are matched last. The exemplar's edges are taken care of by its periodic component; three channels are taken as brightness and
-/// the principal axes of what it does not tell ([`crate::PrincipalColours::led_by`]). Of `options`, the mode is of no account. Same seed, same bits, at any number of threads.
+/// White noise is matched to the distribution of colours of the exemplar and to the distributions of the bands of its
+/// steerable pyramid, alternately; the colours are matched last. The edges of the exemplar are treated by its periodic
+/// component. Three channels are decomposed into brightness and the principal axes of the residual colours
+/// ([`crate::PrincipalColours::led_by`]). The mode of `options` is ignored. The same seed gives the same bits at any
+/// number of threads.
 ///
-/// Cost: two pyramids of the result a round and channel; 512 x 512 in colour takes about a second.
+/// Cost: two pyramids of the result per iteration and channel; 512 x 512 in colour takes about a second.
 ///
 /// # Errors
 ///
-/// [`TextureError`]: an exemplar or result under 8 pixels, NaN, too little in the mask, a result beyond the memory limit,
-/// a progress function that says break.
+/// [`TextureError`]: an exemplar or result under 8 pixels, NaN, too few pixels in the mask, a result beyond the memory
+/// limit, cancellation.
 ///
 /// # References
 ///
@@ -53,7 +55,7 @@ pub fn synthesize_image(
     synthesize_image_with_report(exemplar, size, options, &|done, _| progress(done)).map(|(image, _)| image)
 }
 
-/// As [`synthesize_image`], with a report of what was done: levels used, how the bands converged, what to know.
+/// [`synthesize_image`] with a report: levels used, convergence of the bands, findings.
 ///
 /// # Errors
 ///
@@ -106,7 +108,7 @@ pub fn synthesize_image_with_report(
         .collect();
     let mut canvas = Canvas::new(start, &exemplar, options.matching);
     let mut coefficients = vec![Vec::new(); count];
-    for round in 0..options.iterations {
+    for iteration in 0..options.iterations {
         canvas.match_channels();
         let errors: Vec<(f64, usize)> = canvas
             .components
@@ -125,7 +127,7 @@ pub fn synthesize_image_with_report(
             })
             .collect();
         report.band_errors.push(root_mean_square(&errors));
-        if watch((round + 1) as f64 / options.iterations as f64, &report).is_break() {
+        if watch((iteration + 1) as f64 / options.iterations as f64, &report).is_break() {
             return Err(TextureError::Cancelled);
         }
     }

@@ -8,17 +8,17 @@ use stereology_spectrum::{RealFft, frequency};
 use crate::canvas::Canvas;
 use crate::exemplar::{Exemplar, Prepared, View};
 use crate::plan::{Plan, shaped, white_noise};
-use crate::slice_matching::{Rounds, match_slices, match_volume};
+use crate::slice_matching::{Setup, match_slices, match_volume};
 use crate::targets::{Analysis, BandTargets, Pooling};
 use crate::{Mode, TextureError, TextureOptions, TextureReport, VolumeSpectrum, Watch, volume_spectrum};
 
-/// A volume whose slices look like the exemplar at the exemplar's pixel scale, and that repeats without a seam along all
-/// three axes. See [`synthesize_volume_with_report`], of which this is the volume.
+/// Synthesises a volume whose slices look like the exemplar at its pixel scale, and that is periodic without a seam
+/// along all three axes. See [`synthesize_volume_with_report`] for details.
 ///
 /// # Errors
 ///
-/// [`TextureError`]: an exemplar or result under 8 samples, NaN, too little in the mask, a result beyond the memory limit,
-/// a progress function that says break.
+/// [`TextureError`]: an exemplar or result under 8 samples, NaN, too few pixels in the mask, a result beyond the memory
+/// limit, cancellation.
 ///
 /// # Examples
 ///
@@ -43,16 +43,17 @@ pub fn synthesize_volume(
     synthesize_volume_with_report(exemplar, size, options, &|done, _| progress(done)).map(|(volume, _)| volume)
 }
 
-/// As [`synthesize_volume`], with a report of what was done: levels used, how the bands converged, what to know.
+/// [`synthesize_volume`] with a report: levels used, convergence of the bands, findings.
 ///
-/// `watch` is told the part done and the report so far: after each round there is one more of its `slice_errors`.
+/// `watch` receives the completed fraction and the report so far: every iteration appends one value to `slice_errors`.
 ///
-/// The volume is (z, y, x, channel) of `size` (nz, ny, nx). Its channels have the exemplar's distributions (mean included)
-/// exactly up to the matching; what else its slices share with the exemplar depends on [`Mode`].
+/// The volume has axes (z, y, x, channel) and `size` (nz, ny, nx). Its channels have the distributions of the exemplar
+/// (including the mean) up to the accuracy of the matching; which other statistics its slices share with the exemplar
+/// depends on [`Mode`].
 ///
-/// With a mask, only its pixels' statistics count: the distribution of their values, the spectrum from pairs of them, and
-/// those pyramid coefficients whose filter lies (nearly) inside the mask; if a level has too few of these, those that lie
-/// most inside, and the report says so.
+/// With a mask, only the statistics of its pixels count: the distribution of their values, the spectrum from pairs of
+/// them, and the pyramid coefficients whose filter lies (nearly) inside the mask. If a level has too few of these,
+/// those with the largest part inside are used, and the report contains a finding.
 ///
 /// # Errors
 ///
@@ -87,17 +88,17 @@ pub fn synthesize_volume_with_report(
     synthesize(&[*exemplar], size, options, watch)
 }
 
-/// A volume whose slices look like one exemplar an axis, orientations included: see
-/// [`synthesize_volume_with_report`] for what else holds. The mode of `options` is of no account.
+/// Synthesises a volume whose slices look like one exemplar per axis, including its orientations. See
+/// [`synthesize_volume_with_report`] for further details. The mode of `options` is ignored.
 ///
-/// The first exemplar shows the slices normal to z (its rows run along y, its columns along x), the second those normal to y
-/// (rows along z, columns along x), the third those normal to x (rows along z, columns along y). With two, the second
-/// stands for both y and x: a view from above and one from the side. With one, it stands for all three.
+/// The first exemplar describes the slices normal to z (rows along y, columns along x), the second those normal to y
+/// (rows along z, columns along x), the third those normal to x (rows along z, columns along y). With two exemplars,
+/// the second is used for both y and x: a view from above and one from the side. With one, it is used for all three.
 ///
-/// The colours of the volume are distributed as those of all exemplars together. Where exemplars contradict one another (a
-/// volume has one spectrum, and every wave of it shows on two or three of the axes), the result lies between them:
-/// the report's `band_errors` stay high. What is coarser than the pyramid is matched only on the axes whose exemplars vary most in
-/// it: a picture of one layer does not tell how much the layers differ.
+/// The colours of the volume have the distribution of those of all exemplars together. Where exemplars contradict each
+/// other (a volume has one spectrum, and every wave of it appears on two or three of the axes), the result lies between
+/// them, and the `band_errors` of the report stay high. The low-pass residual is matched only on the axes whose
+/// exemplars vary most in it, because an image of a single layer does not reveal how much the layers differ.
 ///
 /// # Errors
 ///
@@ -105,7 +106,7 @@ pub fn synthesize_volume_with_report(
 ///
 /// # Examples
 ///
-/// Layers seen from the side, nothing but noise from above:
+/// Layers in the view from the side, noise in the view from above:
 ///
 /// ```
 /// use ndarray::Array3;
@@ -156,7 +157,7 @@ fn synthesize(
     let mut targets = |view: &View| targets_of(view, &varying, &plan, options, &mut report);
     let last = prepared.views.len() - 1;
     let targets = if options.mode == Mode::Oriented {
-        // The passes see the slices normal to y with rows along x: transposed.
+        // The slices normal to y are processed with rows along x, so this exemplar is transposed.
         let second = prepared.views[last.min(1)].transposed();
         without_layers([
             targets(&prepared.views[0]),
@@ -168,25 +169,27 @@ fn synthesize(
     } else {
         vec![targets(&prepared.views[0])]
     };
-    let rounds = Rounds {
+    let setup = Setup {
         size,
         varying: &varying,
-        shares: varying.iter().map(|&c| prepared.share(c)).collect(),
+        variance_fractions: varying.iter().map(|&c| prepared.variance_fraction(c)).collect(),
         targets: [0, 1, 2].map(|axis: usize| targets[axis.min(targets.len() - 1)].as_slice()),
         options,
         levels: plan.levels,
         watch,
     };
     let canvas = match options.mode {
-        Mode::Slices | Mode::Oriented => match_slices(canvas, &rounds, &mut report)?,
-        Mode::Spectrum | Mode::Volume => match_volume(canvas, &rounds, &mut report)?,
+        Mode::Slices | Mode::Oriented => match_slices(canvas, &setup, &mut report)?,
+        Mode::Spectrum | Mode::Volume => match_volume(canvas, &setup, &mut report)?,
     };
     let shape = (size[0], size[1], size[2], prepared.count());
     Ok((shaped(shape, canvas.finish()), report))
 }
 
-/// One picture of a layered rock from above shows one layer: it cannot say how much the layers differ. So what is coarser than
-/// the pyramid is matched only on the axes whose exemplars (nearly) vary most in it.
+/// Removes the target of the low-pass residual on axes whose exemplars vary less in it than the largest (by more than a
+/// fifth).
+///
+/// An image of a layered rock from above contains a single layer and does not reveal how much the layers differ.
 fn without_layers(targets: [Vec<BandTargets>; 3]) -> [Vec<BandTargets>; 3] {
     let variance = |of: &Vec<BandTargets>| of.iter().map(BandTargets::low_variance).sum::<f64>();
     let most = targets.iter().map(variance).fold(0.0, f64::max);
@@ -199,7 +202,7 @@ fn without_layers(targets: [Vec<BandTargets>; 3]) -> [Vec<BandTargets>; 3] {
     })
 }
 
-/// The targets of the varying components of one exemplar; what there is to know about them goes into the report.
+/// The targets of the varying components of one exemplar; findings are appended to the report.
 fn targets_of(
     view: &View,
     varying: &[usize],
@@ -224,7 +227,7 @@ fn targets_of(
         .collect()
 }
 
-/// Gives a noise the spectrum of a volume: its phases are kept, its amplitudes replaced.
+/// Gives noise the spectrum of a volume: phases are kept, amplitudes replaced.
 fn impose_spectrum(field: &mut [f32], size: [usize; 3], wanted: &VolumeSpectrum) {
     let fft = RealFft::<f32>::new(&size).expect("sides of at least 8");
     let mut spectrum = vec![stereology_spectrum::Complex::new(0.0_f32, 0.0); fft.spectrum_shape().iter().product()];

@@ -1,4 +1,4 @@
-//! The steerable pyramid of volumes, with axes that share out all power evenly.
+//! The steerable pyramid of volumes, with tight families of axes.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use crate::bank::{FilterBank, most_levels};
 use crate::filters::Directions;
 use crate::steerable::check_spacing;
 
-/// Families of axes of space whose filters `(v_b · u)^p` share out all power: `Σ_b (v_b · u)^2p = n / (2p + 1)` in every
-/// direction u. Three axes with p = 2 would not.
+/// Tight families of axes, whose filters `(v_b · u)^p` divide the power of every direction u: `Σ_b (v_b · u)^2p = n /
+/// (2p + 1)`. Three axes with p = 2 are not tight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Axes {
-    /// No axes: one band a level.
+    /// No axes: one band per level.
     #[default]
     Isotropic,
     /// The three axes of the array, p = 1.
@@ -27,7 +27,7 @@ pub enum Axes {
 }
 
 impl Axes {
-    /// Unit vectors (x, y, z), none if isotropic.
+    /// Unit vectors (x, y, z); empty if isotropic.
     ///
     /// # Examples
     ///
@@ -66,7 +66,8 @@ impl Axes {
     }
 }
 
-/// The steerable pyramid of volumes of one shape: any size from 8 samples an axis, periodic, perfect reconstruction.
+/// The steerable pyramid of volumes of one shape: any size from 8 samples per axis, periodic, with perfect
+/// reconstruction.
 ///
 /// # Formula
 ///
@@ -95,7 +96,7 @@ pub struct VolumePyramid<T: Real> {
 }
 
 impl<T: Real> VolumePyramid<T> {
-    /// Pyramid of volumes of `shape` (z, y, x) whose samples lie `spacing` (z, y, x; any unit) apart.
+    /// Pyramid of volumes of `shape` (z, y, x) with distances `spacing` between samples (z, y, x; any unit).
     ///
     /// # Errors
     ///
@@ -106,7 +107,7 @@ impl<T: Real> VolumePyramid<T> {
         if levels == 0 || levels > most {
             return Err(PyramidError::VolumeLevels {
                 shape,
-                asked: levels,
+                requested: levels,
                 most,
             });
         }
@@ -117,7 +118,7 @@ impl<T: Real> VolumePyramid<T> {
         })
     }
 
-    /// Takes a volume apart.
+    /// Decomposes a volume into bands.
     ///
     /// # Errors
     ///
@@ -144,17 +145,17 @@ impl<T: Real> VolumePyramid<T> {
         })
     }
 
-    /// The volume of a pyramid's bands, changed or not.
+    /// Reconstructs a volume from bands.
     ///
     /// # Panics
     ///
-    /// If the bands are those of a pyramid of another shape, other levels or axes.
+    /// If the bands belong to a pyramid with another shape, levels or axes.
     #[must_use]
     pub fn reconstruct(&self, bands: &VolumeBands<T>) -> Array3<T> {
         assert_eq!(
             self.bank.ranges(),
             bands.bank.ranges(),
-            "the bands are of another pyramid"
+            "the bands belong to another pyramid"
         );
         let shape = [0, 1, 2].map(|axis| self.bank.shape()[axis]);
         let mut volume = vec![T::zero(); shape.iter().product()];
@@ -164,7 +165,8 @@ impl<T: Real> VolumePyramid<T> {
     }
 }
 
-/// The bands of one volume: a high-pass residual, bands by level (0 the finest) and axis, a low-pass residual.
+/// The bands of one volume: the high-pass residual, bands by level (0 is the finest) and axis, and the low-pass
+/// residual.
 #[derive(Clone, Debug)]
 pub struct VolumeBands<T: Real> {
     coefficients: Vec<T>,
@@ -173,7 +175,7 @@ pub struct VolumeBands<T: Real> {
 }
 
 impl<T: Real> VolumeBands<T> {
-    /// What lies beyond Nyquist, in the corners of the frequency cube; full size.
+    /// The high-pass residual: frequencies beyond Nyquist, in the corners of the frequency cube; full size.
     #[must_use]
     pub fn high(&self) -> ArrayView3<'_, T> {
         self.band(0, 0)
@@ -189,7 +191,7 @@ impl<T: Real> VolumeBands<T> {
         self.band(self.index(level, axis), level)
     }
 
-    /// [`Self::oriented`], to be changed.
+    /// Mutable [`Self::oriented`].
     ///
     /// # Panics
     ///
@@ -197,16 +199,17 @@ impl<T: Real> VolumeBands<T> {
     pub fn oriented_mut(&mut self, level: usize, axis: usize) -> ArrayViewMut3<'_, T> {
         let range = self.bank.ranges()[self.index(level, axis)].clone();
         let shape = self.shape_at(level);
-        ArrayViewMut3::from_shape(shape, &mut self.coefficients[range]).expect("a band has its level's shape")
+        ArrayViewMut3::from_shape(shape, &mut self.coefficients[range]).expect("a band has the shape of its level")
     }
 
-    /// What is coarser than the last level; its mean is the volume's.
+    /// The low-pass residual: coarser than the last level, with the mean of the volume.
     #[must_use]
     pub fn low(&self) -> ArrayView3<'_, T> {
         self.band(self.bank.ranges().len() - 1, self.bank.level_count())
     }
 
-    /// The band of a level that a filter along any `axis` (x, y, z) gives: a mixture of the level's bands, exactly.
+    /// The band of a level for a filter along any `axis` (x, y, z): an exact linear combination of the bands of the
+    /// level.
     ///
     /// # Formula
     ///
@@ -264,6 +267,6 @@ impl<T: Real> VolumeBands<T> {
 
     fn band(&self, band: usize, level: usize) -> ArrayView3<'_, T> {
         let values = &self.coefficients[self.bank.ranges()[band].clone()];
-        ArrayView3::from_shape(self.shape_at(level), values).expect("a band has its level's shape")
+        ArrayView3::from_shape(self.shape_at(level), values).expect("a band has the shape of its level")
     }
 }

@@ -11,11 +11,11 @@ const COARSE: f64 = 0.06;
 /// One step changes the logarithm of an amplitude by at most this much.
 const MOST: f32 = 1.0;
 
-/// A change of waves, and what is asked about them.
+/// A change of the amplitudes of waves, and the responses for the Hessian.
 pub(crate) struct Change<'a> {
     /// Logarithm of the factor of amplitudes over the radius, by normal; none before the first step.
     pub(crate) logs: Vec<Vec<f32>>,
-    /// Squared responses, the bands of a step of the radius side by side; empty if nothing is asked.
+    /// Squared responses, with the bands of each step of the radius contiguous; empty if no Hessian is needed.
     pub(crate) responses: &'a [f32],
     pub(crate) bands: usize,
 }
@@ -29,7 +29,7 @@ impl Change<'_> {
         let mut sums = vec![0.0_f32; bins.len()];
         for (table, positions) in self.logs.iter().zip(positions) {
             for (sum, &position) in sums.iter_mut().zip(positions) {
-                // Near enough, since what it gives is measured.
+                // The nearest step is sufficient, since the resulting power is measured.
                 *sum += table[whole_and_part(position).0 as usize];
             }
         }
@@ -38,11 +38,11 @@ impl Change<'_> {
         }
     }
 
-    /// Adds P G_b² G_c² of a row of waves for all pairs of bands of all normals, if the row is one of those asked.
+    /// Adds P G_b² G_c² of a row of waves for all pairs of bands of all normals, if the row is sampled.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "places in a table"
+        reason = "positions in a table"
     )]
     pub(crate) fn add_products(
         &self,
@@ -63,18 +63,18 @@ impl Change<'_> {
             return;
         }
         let weight = if coarse { 1.0 } else { ROWS_SAMPLED as f64 };
-        // Of each normal only neighbouring bands see a wave.
-        let mut seen: Vec<(usize, f64)> = Vec::with_capacity(unknowns);
+        // For each normal only adjacent bands respond to a wave.
+        let mut responding: Vec<(usize, f64)> = Vec::with_capacity(unknowns);
         for (x, power) in power.iter().enumerate() {
-            seen.clear();
+            responding.clear();
             for (n, positions) in positions.iter().enumerate() {
                 let responses = &self.responses[positions[x] as usize * self.bands..][..self.bands];
                 let of_normal = responses.iter().enumerate().filter(|(_, response)| **response > 0.0);
-                seen.extend(of_normal.map(|(b, &response)| (n * self.bands + b, f64::from(response))));
+                responding.extend(of_normal.map(|(b, &response)| (n * self.bands + b, f64::from(response))));
             }
-            for (i, &(row, a)) in seen.iter().enumerate() {
+            for (i, &(row, a)) in responding.iter().enumerate() {
                 let (a, products) = (weight * power * a, &mut products[row * unknowns..][..unknowns]);
-                for &(column, b) in &seen[..=i] {
+                for &(column, b) in &responding[..=i] {
                     products[column] += a * b;
                 }
             }

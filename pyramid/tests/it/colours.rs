@@ -1,4 +1,4 @@
-//! Colours: components that are uncorrelated and lose nothing, and brightness that keeps its bands.
+//! Colour components are uncorrelated and lossless, and brightness keeps its bands.
 
 use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3};
@@ -9,10 +9,10 @@ use stereology_pyramid::{
 };
 
 proptest! {
-    /// Whatever the colours and the weights: components come back to the colours, are uncorrelated, their variances add up to
+    /// For any colours and weights the components reconstruct the colours and are uncorrelated, their variances sum to
     /// that of the colours, and the first is the weighted sum.
     #[test]
-    fn components_led_by_a_sum_are_uncorrelated_and_lose_nothing(
+    fn components_led_by_a_sum_are_uncorrelated_and_lossless(
         colours in prop::collection::vec(prop::array::uniform3(0.0_f32..1.0), 4..40),
         weights in prop::array::uniform3(0.05_f64..1.0),
     ) {
@@ -46,14 +46,14 @@ fn brightness(colours: ArrayView3<'_, f32>) -> Array2<f32> {
     colours.map_axis(ndarray::Axis(2), |c| 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2])
 }
 
-/// Red and green rise and fall together in fine grain, and against each other in coarse blots. Their principal axes are
-/// uncorrelated over all, but in no band: made of these, brightness would be off by 7 %.
+/// Red and green are correlated in fine grain and anticorrelated in coarse spots. Their principal axes are uncorrelated
+/// overall, but correlated in every band: with them, the band variances of brightness would have an error of 7 %.
 #[test]
-fn brightness_has_its_bands_where_colours_hang_together_by_scale() {
+fn brightness_has_its_bands_where_the_correlation_of_colours_depends_on_scale() {
     let n = 64;
     let grain =
         |y: usize, x: usize| ((x * 7919 + y * 104_729 + x * y * 31 + (x * x * y) % 97) % 101) as f32 / 101.0 - 0.5;
-    // Blurred grain, so that it is coarser and an isotropic volume may have such slices.
+    // Blurred grain is coarser, and an isotropic volume can have such slices.
     let blurred = |y: usize, x: usize| {
         let about = (0..25).map(|i| grain((y + i / 5 + 17) % n, (x + i % 5 + 29) % n));
         about.sum::<f32>() / 5.0

@@ -1,8 +1,8 @@
-//! Laws of the pyramid, of matching and of synthesis.
+//! Laws of the pyramids, of matching and of synthesis.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::float_cmp,
-    reason = "tests make small numbers and compare exact ones"
+    reason = "tests use small numbers and compare exact ones"
 )]
 
 mod colours;

@@ -6,8 +6,8 @@ fn values(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<f32>> {
 }
 
 proptest! {
-    /// With as many values as the reference, matching permutes the reference and keeps the order of the values; doing it
-    /// again changes nothing.
+    /// With as many values as the reference, matching permutes the reference and keeps the order of the values; a
+    /// second matching changes nothing.
     #[test]
     fn matching_is_exact_and_idempotent(before in values(1..200), seed in 0_u64..1000) {
         let reference: Vec<f32> = (0..before.len()).map(|i| ((i as u64 * 7919 + seed) % 613) as f32).collect();
@@ -27,9 +27,9 @@ proptest! {
         prop_assert_eq!(once, matched);
     }
 
-    /// The table gives the exact result up to what a bin of the range hides.
+    /// The table gives the exact result within the width of a bin.
     #[test]
-    fn the_table_is_near_the_exact_result(before in values(500..900), reference in values(300..600)) {
+    fn the_table_is_close_to_the_exact_result(before in values(500..900), reference in values(300..600)) {
         let quantiles = Quantiles::new(reference).unwrap();
         let (mut exact, mut table) = (before.clone(), before);
         match_histogram(&mut exact, &quantiles).unwrap();
@@ -39,7 +39,7 @@ proptest! {
     }
 }
 
-/// Equal values are ranked by position by ranks, stay equal by table; nothing that is not a number gets through.
+/// Exact matching ranks equal values by position, the table keeps them equal; NaN is refused.
 #[test]
 fn ties_constants_and_nan() {
     let quantiles = Quantiles::new(vec![1.0, 2.0, 3.0]).unwrap();

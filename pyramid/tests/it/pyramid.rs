@@ -18,7 +18,7 @@ fn rolled(image: &Array2<f64>, dy: usize, dx: usize) -> Array2<f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// The image comes back from its bands at any size, odd and non-square included, in both precisions.
+    /// The bands reconstruct the image at any size, including odd and non-square sizes, in both precisions.
     #[test]
     fn reconstruction_is_perfect(h in 8_usize..70, w in 8_usize..70, k in 1_usize..9, seed in 0_u64..1000, pick in 0_usize..9) {
         let levels = 1 + pick % SteerablePyramid::<f64>::most_levels([h, w]);
@@ -32,9 +32,9 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 
-    /// The real parts of analytic bands are the bands: the image comes back from them too, in both precisions.
+    /// The real parts of complex bands are the bands: they reconstruct the image too, in both precisions.
     #[test]
-    fn complex_bands_rebuild_the_image(h in 8_usize..60, w in 8_usize..60, k in 1_usize..7, seed in 0_u64..1000, pick in 0_usize..9) {
+    fn complex_bands_reconstruct_the_image(h in 8_usize..60, w in 8_usize..60, k in 1_usize..7, seed in 0_u64..1000, pick in 0_usize..9) {
         let levels = 1 + pick % SteerablePyramid::<f64>::most_levels([h, w]);
         let image = noise(seed, h, w);
         let pyramid = SteerablePyramid::new([h, w], levels, k).unwrap();
@@ -46,9 +46,9 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 
-    /// The bands hold the energy of the image, each weighted by how much coarser its grid is (Parseval).
+    /// The energies of the bands, weighted by the coarseness of their grids, sum to that of the image (Parseval).
     #[test]
-    fn bands_hold_the_energy(h in 8_usize..70, w in 8_usize..70, k in 1_usize..7, seed in 0_u64..1000) {
+    fn energies_of_bands_sum_to_that_of_the_image(h in 8_usize..70, w in 8_usize..70, k in 1_usize..7, seed in 0_u64..1000) {
         let image = noise(seed, h, w);
         let levels = SteerablePyramid::<f64>::most_levels([h, w]);
         let bands = SteerablePyramid::new([h, w], levels, k).unwrap().build(image.view()).unwrap();
@@ -57,7 +57,7 @@ proptest! {
         prop_assert!((held - energy).abs() < 1e-12 * energy);
     }
 
-    /// Moving the image by whole samples of a level moves that level's bands with it (sizes that halve exactly).
+    /// A shift of the image by whole samples of a level shifts the bands of that level (for sizes that halve exactly).
     #[test]
     fn bands_move_with_the_image(h in 4_usize..9, w in 4_usize..9, dy in 0_usize..9, dx in 0_usize..9, seed in 0_u64..1000) {
         let (h, w) = (8 * h, 8 * w);
@@ -74,15 +74,15 @@ proptest! {
         }
     }
 
-    /// Turning a square image by a right angle turns the orientations by a right angle.
+    /// Transposing a square image mirrors the orientations about the diagonal.
     #[test]
-    fn bands_turn_with_the_image(n in 8_usize..40, seed in 0_u64..1000) {
+    fn bands_follow_a_transposed_image(n in 8_usize..40, seed in 0_u64..1000) {
         let image = noise(seed, n, n);
         let pyramid = SteerablePyramid::new([n, n], 1, 4).unwrap();
         let bands = pyramid.build(image.view()).unwrap();
         let mirrored = pyramid.build(image.t()).unwrap();
-        // A transposed image has its angles mirrored about the diagonal: θ → π/2 − θ, b → 2 − b modulo 4; an odd filter
-        // changes sign where the angle leaves the half turn.
+        // Transposition maps θ → π/2 − θ, b → 2 − b modulo 4; an odd filter changes sign where the angle leaves the
+        // half turn.
         for (b, mirror, sign) in [(0, 2, 1.0), (1, 1, 1.0), (3, 3, -1.0)] {
             let there = mirrored.oriented(0, mirror);
             prop_assert!(bands.oriented(0, b).t().iter().zip(there).all(|(a, c)| (a - sign * c).abs() < 1e-12));
@@ -90,10 +90,10 @@ proptest! {
     }
 }
 
-/// A wave of any direction θ shows in band b with the amplitude α cos³(θ − πb/4): the identity that steering rests on.
+/// A wave of direction θ has the amplitude α cos³(θ − πb/4) in band b: the identity on which steering is based.
 #[test]
-fn waves_show_in_each_orientation_by_the_cube_of_the_cosine() {
-    // At 10 to 14 cycles in 64 pixels (r of 0.44) all power is shared by levels 0 and 1.
+fn amplitude_of_waves_is_the_cube_of_the_cosine_in_each_orientation() {
+    // At 10 to 14 cycles in 64 pixels (r of 0.44) all power is in levels 0 and 1.
     for (ky, kx) in [(0, 14), (14, 0), (10, 10), (5, 13), (13, -5), (-9, 11)] {
         let phase = |y: usize, x: usize| f64::from(ky) * y as f64 + f64::from(kx) * x as f64;
         let wave = Array2::from_shape_fn((64, 64), |(y, x)| (std::f64::consts::TAU * phase(y, x) / 64.0).cos());
@@ -103,7 +103,7 @@ fn waves_show_in_each_orientation_by_the_cube_of_the_cosine() {
             .unwrap()
             .summaries();
         let angle = f64::from(ky).atan2(f64::from(kx));
-        // α² = 4/5 for four orientations; a wave has mean square 1/2, shared by the levels.
+        // α² = 4/5 for four orientations; a wave has mean square 1/2, divided between the levels.
         for b in 0..4 {
             let held: f64 = summaries
                 .iter()
@@ -119,7 +119,7 @@ fn waves_show_in_each_orientation_by_the_cube_of_the_cosine() {
     }
 }
 
-/// A constant image is its own low-pass, and nothing else.
+/// A constant image is entirely in the low-pass.
 #[test]
 fn constant_image_lies_in_the_low_pass() {
     let image = Array2::from_elem((37, 50), 0.7);
@@ -134,7 +134,7 @@ fn constant_image_lies_in_the_low_pass() {
     assert_eq!(bands.low().mean_axis(Axis(0)).unwrap().len(), 13);
 }
 
-/// Large images go through parallel paths: one thread gives the bits of many.
+/// Large images take parallel paths, and the bits do not depend on the number of threads.
 #[test]
 fn same_bits_at_any_number_of_threads() {
     let image = noise(1, 400, 401);
@@ -146,7 +146,7 @@ fn same_bits_at_any_number_of_threads() {
     assert_eq!(with(1), with(3));
 }
 
-/// What cannot be taken apart is refused by name.
+/// Invalid images are refused with a specific error.
 #[test]
 fn bad_images_are_refused() {
     assert_eq!(

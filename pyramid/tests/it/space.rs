@@ -22,9 +22,9 @@ fn family() -> impl Strategy<Value = Axes> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Volumes come back from their bands at any size and spacing, in both precisions, from every family of axes.
+    /// Bands reconstruct the volume at any size and spacing, in both precisions, for every family of axes.
     #[test]
-    fn volumes_come_back(z in 8_usize..20, y in 8_usize..20, x in 8_usize..20, wide in 1.0_f64..4.0, axes in family(), seed in 0_u64..99) {
+    fn volumes_are_reconstructed(z in 8_usize..20, y in 8_usize..20, x in 8_usize..20, wide in 1.0_f64..4.0, axes in family(), seed in 0_u64..99) {
         let (shape, spacing) = ([z, y, x], [wide, 1.0, 1.0]);
         let volume = noise(seed, shape);
         let pyramid = VolumePyramid::new(shape, spacing, 1, axes).unwrap();
@@ -36,9 +36,9 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 
-    /// So do they from pyramids of several levels, at odd and unequal sides.
+    /// Pyramids with several levels reconstruct the volume, also at odd and unequal sides.
     #[test]
-    fn volumes_come_back_from_several_levels(z in 16_usize..40, y in 16_usize..40, x in 16_usize..40, axes in family(), seed in 0_u64..99) {
+    fn volumes_are_reconstructed_from_several_levels(z in 16_usize..40, y in 16_usize..40, x in 16_usize..40, axes in family(), seed in 0_u64..99) {
         let volume = noise(seed, [z, y, x]);
         let pyramid = VolumePyramid::new([z, y, x], [1.0; 3], 2, axes).unwrap();
         let back = pyramid.reconstruct(&pyramid.build(volume.view()).unwrap());
@@ -49,7 +49,7 @@ proptest! {
         prop_assert!(single.iter().zip(&back).all(|(a, b)| (a - b).abs() <= 2e-6));
     }
 
-    /// A family of axes shares out the power of every direction evenly (tightness): Σ (v·u)^2p = n/(2p + 1).
+    /// Every family of axes is tight: Σ (v·u)^2p = n/(2p + 1) for every direction u.
     #[test]
     fn axes_are_tight(a in -1.0_f64..1.0, b in -1.0_f64..1.0, c in 0.1_f64..1.0) {
         let u = Vector3::new(a, b, c).normalize();
@@ -60,8 +60,8 @@ proptest! {
         }
     }
 
-    /// Steered along any axis, a band is what a filter along that axis gives: for a wave, (axis · direction)^p of the band along
-    /// the direction itself.
+    /// A band steered to any axis is that of a filter along the axis: for a wave, (axis · direction)^p times the band
+    /// along the direction of the wave.
     #[test]
     fn volumes_steer_to_any_axis(a in -1.0_f64..1.0, b in -1.0_f64..1.0, c in 0.1_f64..1.0, pick in 0_usize..3) {
         let (axes, p) = [(Axes::Octahedron, 1), (Axes::Icosahedron, 2), (Axes::Dodecahedron, 2)][pick];
@@ -76,7 +76,7 @@ proptest! {
         prop_assert!(own.iter().zip(&steered).all(|(o, s)| (factor * o - s).abs() < 1e-12));
     }
 
-    /// An image is steered to any angle: a wave's band there is cos^p of the angle between of the band along the wave.
+    /// Images are steered to any angle: the band of a wave is the band along the wave times cos^p of the angle between.
     #[test]
     fn images_steer_to_any_angle(angle in -3.2_f64..3.2, k in 1_usize..8) {
         let wave = Array2::from_shape_fn((32, 32), |(y, x)| (std::f64::consts::TAU * (4.0 * x as f64 + 3.0 * y as f64) / 32.0).cos());
@@ -87,9 +87,9 @@ proptest! {
         prop_assert!(along.iter().zip(&steered).all(|(o, s)| (factor * o - s).abs() < 1e-12));
     }
 
-    /// Images of any size and spacing come back, with or without gain, from real and complex bands.
+    /// Images of any size and spacing are reconstructed, with or without gain, from real and complex bands.
     #[test]
-    fn spacing_and_gain_keep_the_image(h in 8_usize..50, w in 8_usize..50, wide in 0.2_f64..5.0, k in 1_usize..6, seed in 0_u64..99) {
+    fn images_are_reconstructed_with_spacing_and_gain(h in 8_usize..50, w in 8_usize..50, wide in 0.2_f64..5.0, k in 1_usize..6, seed in 0_u64..99) {
         let image = noise(seed, [1, h, w]).index_axis_move(Axis(0), 0);
         for gain in [Gain::None, Gain::Pyrtools] {
             let pyramid = SteerablePyramid::with_spacing([h, w], [wide, 1.0], 1, k).unwrap().with_gain(gain);
@@ -100,9 +100,9 @@ proptest! {
     }
 }
 
-/// Real and imaginary part of an oriented band hold the same power: each frequency of one side, twice.
+/// Real and imaginary part of an oriented band have the same power.
 #[test]
-fn complex_bands_have_equal_parts() {
+fn parts_of_complex_bands_have_equal_power() {
     let image = noise(3, [1, 40, 33]).index_axis_move(Axis(0), 0);
     for k in [3, 4] {
         let bands = SteerablePyramid::new([40, 33], 2, k)
@@ -118,7 +118,7 @@ fn complex_bands_have_equal_parts() {
     }
 }
 
-/// With pyrtools' gain, coefficients of level l of 64 x 64 are 4^l times those without.
+/// With the gain of pyrtools, coefficients of level l of 64 x 64 are 4^l times those without.
 #[test]
 fn gain_is_the_ratio_of_samples() {
     let image = noise(1, [1, 64, 64]).index_axis_move(Axis(0), 0);
@@ -138,7 +138,8 @@ fn gain_is_the_ratio_of_samples() {
     }
 }
 
-/// Cuts along the axes are the slices: the bands of all slices have the mean squares that the cuts tell, and the same values.
+/// Cuts along the axes are the slices: `cut_variances` gives the mean squares of the bands of all slices, and
+/// `cut_band` their values.
 #[test]
 fn cuts_along_axes_are_slices() {
     let volume = noise(8, [16, 16, 16]).mapv(|v| v as f32 - 0.5);
@@ -161,7 +162,7 @@ fn cuts_along_axes_are_slices() {
             assert!((found / sum - 1.0).abs() < 1e-4, "axis {axis}: {found} for {sum}");
         }
     }
-    // The frame of the plane normal to z: each band is that of one orientation of the slices, up to its sign.
+    // On planes normal to z, each band is that of one orientation of the slices, up to its sign.
     let slice = pyramid.build(volume.index_axis(Axis(0), 5)).unwrap();
     for b in 0..4 {
         let cut = cut_band(volume.view(), &normals[0], 0, b, 4).unwrap();
@@ -179,7 +180,7 @@ fn cuts_along_axes_are_slices() {
     }
 }
 
-/// What cannot be taken apart is refused by name.
+/// Invalid volumes are refused with a specific error.
 #[test]
 fn bad_volumes_are_refused() {
     assert!(matches!(

@@ -1,4 +1,4 @@
-//! A Poisson field of overlapping spheres: everything about its spectrum is known.
+//! A Poisson field of overlapping spheres, whose spectrum is known.
 
 use ndarray::{Array3, Axis};
 use rand::{RngExt, SeedableRng};
@@ -18,9 +18,11 @@ fn form_factor(f: f64, radius: f64) -> f64 {
     }
 }
 
-/// Slices of a Poisson field of spheres have the spectrum that the form factor says: density × form factor squared,
-/// summed over the waves along the normal. Drawn once; false-alarm rate below 1e-6 over all bins: each bin's sum has at
-/// least 200 independent exponential terms, so 6.5 standard deviations are beyond 3e-8 for each of 12.
+/// The spectrum of slices of a Poisson field of spheres is density × squared form factor, summed over the waves along
+/// the normal.
+///
+/// One realisation. False-alarm rate below 1e-6 over all bins: the sum in each bin has at least 200 independent
+/// exponential terms, so 6.5 standard deviations have a probability below 3e-8 for each of 12.
 #[test]
 fn slices_of_sphere_field_follow_the_form_factor() {
     const N: usize = 24;
@@ -30,7 +32,7 @@ fn slices_of_sphere_field_follow_the_form_factor() {
     let centres: Vec<[f64; 3]> = (0..COUNT)
         .map(|_| [0; 3].map(|_| N as f64 * rng.random::<f64>()))
         .collect();
-    // The field, limited to the band of its grid, by its spectrum.
+    // The band-limited field, from its spectrum.
     let fft = RealFft::<f64>::new(&[N, N, N]).unwrap();
     let wave = |k: [usize; 3]| k.map(|k| frequency(k, N));
     let radius_of = |k: [usize; 3]| wave(k).iter().map(|f| f * f).sum::<f64>().sqrt();
@@ -47,7 +49,7 @@ fn slices_of_sphere_field_follow_the_form_factor() {
         sum * form_factor(radius_of(k), RADIUS)
     });
     let field = fft.inverse(spectrum).unwrap();
-    // Mean periodogram of all slices against its expectation, by radial bins.
+    // Mean periodogram of all slices and its expectation, by radial bins.
     let flat = RealFft::<f64>::new(&[N, N]).unwrap();
     let (mut found, mut expected, mut variance) = (vec![0.0; 12], vec![0.0; 12], vec![0.0; 12]);
     let density = COUNT as f64 / (N * N * N) as f64;
@@ -64,7 +66,7 @@ fn slices_of_sphere_field_follow_the_form_factor() {
             for z in (0..N).filter(|&z| z != N / 2) {
                 let power = density * form_factor(radius_of([z, y, x]), RADIUS).powi(2) / N as f64;
                 expected[bin] += twice * power;
-                // A wave and its mirror image are one draw: half as many terms of twice the size.
+                // A wave and its complex conjugate are not independent: half as many terms of twice the size.
                 variance[bin] += twice * 2.0 * power * power;
                 terms[bin] += twice / 2.0;
             }
@@ -79,7 +81,7 @@ fn slices_of_sphere_field_follow_the_form_factor() {
     }
 }
 
-/// From the spectrum of its slices, the spectrum of the volume comes back: the form factor again.
+/// The spectrum of the volume, which is the form factor, is recovered from the spectrum of its slices.
 #[test]
 fn sphere_volume_is_recovered_from_its_slices() {
     let radius = 3.0;
@@ -105,7 +107,7 @@ fn sphere_volume_is_recovered_from_its_slices() {
     assert!(found.residual < 0.15, "{}", found.residual);
 }
 
-/// A spectrum that no volume's slices can have (a ring) is met as well as it can be, and the residual says so.
+/// A spectrum that slices of no volume can have (a ring) is approximated, and the residual reports the difference.
 #[test]
 fn impossible_slices_leave_a_residual() {
     let frequency: Vec<f64> = (0..46).map(|i| (i as f64 + 0.5) / 64.0).collect();

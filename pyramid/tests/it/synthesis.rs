@@ -29,7 +29,7 @@ fn speckle(n: usize, channels: usize) -> Array3<f32> {
     })
 }
 
-/// Mean squares of the pyramid bands of all slices along an axis, orientations pooled.
+/// Mean squares of the pyramid bands of all slices along an axis, with orientations pooled.
 fn band_variances(volume: ArrayView4<'_, f32>, axis: usize) -> Vec<f64> {
     let plane = volume.index_axis(Axis(3), 0);
     let mut sums = vec![0.0; 4];
@@ -56,7 +56,7 @@ fn image_variances(image: &Array2<f32>) -> Vec<f64> {
     vec![all[0].mean_square, pooled(0), pooled(1), all[9].mean_square]
 }
 
-/// Slices along every axis have the exemplar's band variances within 3 %; those of the plain method do not come near.
+/// Slices along every axis have the band variances of the exemplar within 3 %; those of the 1995 method do not.
 #[test]
 fn slices_have_the_band_variances_of_the_exemplar() {
     let exemplar = speckle(64, 1);
@@ -81,9 +81,9 @@ fn slices_have_the_band_variances_of_the_exemplar() {
     assert!(volume > 0.2, "volume: {volume}");
 }
 
-/// The wrap is a plane like any other, along all axes, and the sides need not be equal.
+/// The step across the wrap is like any other step, along all axes, and the sides need not be equal.
 #[test]
-fn volumes_repeat_without_a_seam() {
+fn volumes_are_periodic_without_a_seam() {
     let exemplar = speckle(48, 3);
     for mode in [Mode::Slices, Mode::Oriented, Mode::Spectrum, Mode::Volume] {
         let options = TextureOptions::default().with_mode(mode).with_iterations(2);
@@ -104,14 +104,14 @@ fn volumes_repeat_without_a_seam() {
             steps.sort_by(f32::total_cmp);
             assert!(
                 wrap < 1.3 * steps[n / 2],
-                "{mode:?}, axis {axis}: {wrap} beside {}",
+                "{mode:?}, axis {axis}: {wrap} compared with {}",
                 steps[n / 2]
             );
         }
     }
 }
 
-/// Every channel of the result has the exemplar's mean and quantiles.
+/// Every channel of the result has the mean and the quantiles of the exemplar.
 #[test]
 fn channels_have_the_exemplar_distribution() {
     let exemplar = speckle(40, 3);
@@ -125,7 +125,8 @@ fn channels_have_the_exemplar_distribution() {
                 v
             };
             let (found, wanted) = (sorted(&image), sorted(&exemplar));
-            // The exemplar's periodic component is what is matched: nearly the exemplar, as this one closes on itself.
+            // The target is the periodic component of the exemplar, which is nearly the exemplar, since this one is
+            // periodic.
             let distance = found.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).sum::<f32>() / 1600.0;
             assert!(distance < 0.05 * exemplar.std(0.0), "{distance}");
             let mean = |v: &[f32]| v.iter().map(|&v| f64::from(v)).sum::<f64>() / 1600.0;
@@ -134,12 +135,12 @@ fn channels_have_the_exemplar_distribution() {
     }
 }
 
-/// Pixels outside the mask are never read: garbage and NaN there give the same bits.
+/// Pixels outside the mask are never read: any values there, including NaN, give the same bits.
 #[test]
-fn what_is_masked_out_is_never_read() {
+fn pixels_outside_the_mask_are_never_read() {
     let exemplar = speckle(48, 3);
     let mask = Array2::from_shape_fn((48, 48), |(y, x)| (y as f32 - 20.0).hypot(x as f32 - 30.0) > 11.0);
-    let spoilt = |value: f32| {
+    let replaced = |value: f32| {
         let mut image = exemplar.clone();
         for (mut pixel, &inside) in image.lanes_mut(Axis(2)).into_iter().zip(&mask) {
             if !inside {
@@ -155,25 +156,26 @@ fn what_is_masked_out_is_never_read() {
         )
         .unwrap()
     };
-    let (nan, loud) = (spoilt(f32::NAN), spoilt(9.0));
-    assert_eq!(nan, loud);
+    let (nan, large) = (replaced(f32::NAN), replaced(9.0));
+    assert_eq!(nan, large);
     assert!(nan.iter().all(|v| v.abs() < 1.0));
 }
 
-/// Under a mask with many holes, statistics stay those of the whole texture: what the binder of a photograph needs.
+/// Under a mask with many holes the statistics are those of the whole texture, as required for the binder of a
+/// photograph.
 #[test]
 fn a_masked_texture_keeps_its_band_variances() {
     let exemplar = speckle(128, 1);
     let wanted = image_variances(&exemplar.index_axis(Axis(2), 0).to_owned());
-    let mut spoilt = exemplar.clone();
+    let mut holed = exemplar.clone();
     let hole = |y: usize, x: usize| ((y % 24) as f32 - 12.0).hypot((x % 26) as f32 - 13.0) < 8.5;
     let mask = Array2::from_shape_fn((128, 128), |(y, x)| !hole(y, x));
-    spoilt
+    holed
         .indexed_iter_mut()
         .filter(|((y, x, _), _)| hole(*y, *x))
         .for_each(|(_, v)| *v = 5.0);
     let options = TextureOptions::default().with_levels(2).with_iterations(4);
-    let binder = Exemplar::new(spoilt.view()).with_mask(mask.view());
+    let binder = Exemplar::new(holed.view()).with_mask(mask.view());
     let volume = synthesize_volume(&binder, [32, 32, 32], &options, GO).unwrap();
     for axis in 0..3 {
         for (found, wanted) in band_variances(volume.view(), axis).iter().zip(&wanted).take(3) {
@@ -182,7 +184,7 @@ fn a_masked_texture_keeps_its_band_variances() {
     }
 }
 
-/// Same seed, same bits at any number of threads; another seed, another texture.
+/// The same seed gives the same bits at any number of threads; another seed gives another texture.
 #[test]
 fn same_bits_at_any_number_of_threads() {
     let exemplar = speckle(40, 3);
@@ -200,7 +202,7 @@ fn same_bits_at_any_number_of_threads() {
     assert_ne!(with(1, 5, Mode::Slices), with(1, 6, Mode::Slices));
 }
 
-/// Flat colours stay flat; a flat channel among others stays flat.
+/// A constant exemplar gives a constant texture; a constant channel among others stays constant.
 #[test]
 fn constant_channels_are_kept() {
     let mut exemplar = speckle(32, 3);
@@ -223,7 +225,7 @@ fn constant_channels_are_kept() {
     }
 }
 
-/// What cannot be made is refused by name, before memory is asked for.
+/// Invalid input is refused with a specific error, before memory is allocated.
 #[test]
 fn bad_input_is_refused() {
     let options = TextureOptions::default();
@@ -279,7 +281,8 @@ fn bad_input_is_refused() {
     ));
 }
 
-/// Cuts along face and space diagonals have the exemplar's band variances as slices do, and other cuts nearly.
+/// Cuts along face and space diagonals have the band variances of the exemplar as accurately as slices, and other cuts
+/// nearly.
 #[test]
 fn oblique_cuts_match_as_well_as_slices() {
     let exemplar = speckle(64, 1);
@@ -297,18 +300,18 @@ fn oblique_cuts_match_as_well_as_slices() {
     assert!(axis < 0.03, "{axis}");
     for normal in [[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.3, 0.5, 0.8]] {
         let oblique = error(normal);
-        assert!(oblique < 1.3 * axis, "{normal:?}: {oblique} beside {axis}");
+        assert!(oblique < 1.3 * axis, "{normal:?}: {oblique} compared with {axis}");
     }
 }
 
-/// The caller hears of every round, and may stop at any.
+/// Every iteration is reported to the caller, who can cancel after any.
 #[test]
-fn rounds_are_told() {
+fn iterations_are_reported() {
     let exemplar = speckle(32, 1);
     let options = TextureOptions::default().with_iterations(4);
-    let heard = std::sync::Mutex::new(Vec::new());
+    let reported = std::sync::Mutex::new(Vec::new());
     let watch = |_: f64, report: &TextureReport| {
-        heard.lock().unwrap().push(report.slice_errors.len());
+        reported.lock().unwrap().push(report.slice_errors.len());
         if report.slice_errors.len() < 3 {
             ControlFlow::Continue(())
         } else {
@@ -317,17 +320,17 @@ fn rounds_are_told() {
     };
     let stopped = synthesize_volume_with_report(&Exemplar::new(exemplar.view()), [16; 3], &options, &watch);
     assert_eq!(stopped.unwrap_err(), TextureError::Cancelled);
-    let mut heard = heard.into_inner().unwrap();
-    heard.dedup();
-    assert_eq!(heard, [0, 1, 2, 3]);
+    let mut reported = reported.into_inner().unwrap();
+    reported.dedup();
+    assert_eq!(reported, [0, 1, 2, 3]);
     let (_, report) = synthesize_volume_with_report(&Exemplar::new(exemplar.view()), [16; 3], &options, WATCH).unwrap();
     assert_eq!((report.band_errors.len(), report.slice_errors.len()), (4, 4));
     assert!(report.final_error < report.slice_errors[0], "{report:?}");
 }
 
-/// A volume within the limit is made; the bytes named by the refusal are those it takes to have it made.
+/// The error reports the number of bytes that suffice as a limit.
 #[test]
-fn the_refusal_names_the_bytes_needed() {
+fn the_error_reports_the_bytes_required() {
     let exemplar = speckle(16, 3);
     let make = |limit: u64| {
         let options = TextureOptions::default().with_iterations(1).with_memory_limit(limit);
@@ -345,7 +348,7 @@ fn the_refusal_names_the_bytes_needed() {
     );
 }
 
-/// Too many levels are reduced to what fits, and that is said, for images and volumes.
+/// Too many levels are reduced to the largest possible number, and a finding reports it, for images and volumes.
 #[test]
 fn too_many_levels_are_reduced() {
     let exemplar = speckle(32, 1);
@@ -363,9 +366,9 @@ fn too_many_levels_are_reduced() {
     }
 }
 
-/// Exemplars of the three axes show each on its own axis: stripes stay stripes, in the right direction.
+/// Slices along each axis look like their exemplar: stripes stay stripes, with the correct direction.
 #[test]
-fn each_axis_shows_its_exemplar() {
+fn slices_along_each_axis_match_their_exemplar() {
     let base = speckle(48, 1);
     let stripes = Array3::from_shape_fn((48, 48, 1), |(z, x, _)| {
         (std::f32::consts::TAU * z as f32 / 6.0).sin() + base[[z, x, 0]]
@@ -396,9 +399,10 @@ fn each_axis_shows_its_exemplar() {
     ));
 }
 
-/// Every care of edges gives the band variances of a texture that has no edges; a jump at the edge shows if none is taken.
+/// Both treatments of edges give the band variances of a texture without edges; without treatment a jump at the edge
+/// changes them.
 #[test]
-fn edges_are_kept_out() {
+fn treatments_of_edges_remove_their_effect() {
     let tile = speckle(64, 1);
     let ramp = Array3::from_shape_fn((64, 64, 1), |(y, x, _)| tile[[y, x, 0]] + 0.02 * x as f32);
     let wanted = image_variances(&tile.index_axis(Axis(2), 0).to_owned())[1];

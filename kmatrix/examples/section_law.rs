@@ -1,6 +1,8 @@
-//! What do random sections of a body look like? `cargo run --release -p stereology-kmatrix --example section_law [SHAPE] [TOLERANCE]`
+//! What do random sections of a body look like? `cargo run --release -p stereology-kmatrix --example section_law
+//! [SHAPE] [TOLERANCE]`
 //!
-//! SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED` or a mesh file; a box of 1 by 2 by 3 if none is given.
+//! SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED` or a mesh file; a box of 1 by 2 by 3
+//! if none is given.
 
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 

@@ -1,6 +1,6 @@
 //! The area that one contour of a section encloses, while the section moves.
 
-/// Signed area of a contour as a function of height, about some height: area + slope t + curvature t².
+/// Signed area of a contour as a function of the distance t from some height: area + slope t + curvature t².
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ContourArea {
     pub(crate) area: f64,

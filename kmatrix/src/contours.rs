@@ -1,4 +1,5 @@
-//! The contours of a section while it moves: which triangle belongs to which, what area each encloses, which are holes of which.
+//! The contours of a moving section: the triangles of each contour, the area it encloses, and the contour that each
+//! hole belongs to.
 
 use crate::contour_area::ContourArea;
 use crate::depth_measure::DepthMeasure;
@@ -6,16 +7,16 @@ use crate::plane::Plane;
 
 const NONE: u32 = u32::MAX;
 
-/// Contours by number; a number is given to a new contour when an old one ends.
+/// Contours by number. The number of a contour that ended is used again for a new one.
 #[derive(Default)]
 pub(crate) struct Contours {
     contours: Vec<Contour>,
-    /// Contours that exist, in no order.
+    /// Contours that exist, in any order.
     present: Vec<u32>,
     vacant: Vec<u32>,
     /// The contour of each triangle the section cuts.
     of_triangle: Vec<u32>,
-    /// Contours began or ended since holes were last looked for.
+    /// Whether contours began or ended since holes were last assigned.
     changed: bool,
     holes: u32,
     /// The height up to which all profiles were measured at once.
@@ -24,10 +25,10 @@ pub(crate) struct Contours {
 
 #[derive(Clone, Copy)]
 struct Contour {
-    /// About `since`, the height up to which its profile has been measured.
+    /// Area relative to `since`, the height up to which its profile has been measured.
     state: ContourArea,
     since: f64,
-    /// A triangle on it.
+    /// A triangle of the contour.
     triangle: u32,
     kind: Kind,
     exists: bool,
@@ -37,7 +38,7 @@ struct Contour {
 enum Kind {
     Unknown,
     Outer,
-    /// Of which outer contour.
+    /// The outer contour around it.
     Hole(u32),
 }
 
@@ -112,14 +113,14 @@ impl Contours {
         if let Some(place) = self.present.iter().position(|&number| number == contour) {
             self.present.swap_remove(place);
         }
-        // Its number is not given away before the holes it had are looked at.
+        // Its number is not used again until its holes have been assigned to other contours.
         self.changed = true;
         if self.holes == 0 {
             self.vacant.push(contour);
         }
     }
 
-    /// A regular vertex on a contour: its profile is measured up to there, and its curvature jumps.
+    /// Passes a regular vertex of a contour: measures its profile up to there and changes its curvature.
     pub(crate) fn bend(&mut self, contour: u32, height: f64, jump: f64, measure: &mut DepthMeasure) {
         match self.contours[contour as usize].kind {
             Kind::Hole(NONE) => self.advance_alone(contour, height, measure),
@@ -146,7 +147,7 @@ impl Contours {
         }
     }
 
-    /// A hole that rounding left without a contour around it.
+    /// Advances a hole that rounding left without a contour around it.
     fn advance_alone(&mut self, hole: u32, height: f64, measure: &mut DepthMeasure) {
         let hole = &mut self.contours[hole as usize];
         let length = (height - hole.since).max(0.0);
@@ -155,7 +156,8 @@ impl Contours {
         measure.moments.holes += length;
     }
 
-    /// Adds the profile within an outer contour, from where it was last measured up to a height; moves it and its holes there.
+    /// Adds the profile within an outer contour, from the height where it was last measured up to `height`, and moves
+    /// the contour and its holes there.
     fn measure(&mut self, outer: u32, height: f64, measure: &mut DepthMeasure) {
         let contour = &mut self.contours[outer as usize];
         let length = height - contour.since;
@@ -179,9 +181,11 @@ impl Contours {
         measure.add_profile([profile.area, profile.slope, profile.curvature], length);
     }
 
-    /// Tells holes (walked with the solid to the left, they have negative area) and gives each to the smallest outer contour around it.
+    /// Finds holes (traversed with the solid to the left, their area is negative) and assigns each to the smallest
+    /// outer contour around it.
     ///
-    /// All profiles are settled at `low`; `middle` is halfway to the next vertex, just below which `plane` lies.
+    /// All profiles are measured up to `low`; `middle` is halfway to the next vertex; `plane` lies just below that
+    /// vertex.
     pub(crate) fn find_holes(&mut self, plane: &Plane<'_>, low: f64, middle: f64) {
         self.changed = false;
         let mut outers = 0;
@@ -212,14 +216,14 @@ impl Contours {
                 }
             }
         }
-        // Now that no hole names an ended contour, its number is free.
+        // No hole refers to an ended contour now, so its number is free.
         self.vacant.clear();
         let numbers = 0..u32::try_from(self.contours.len()).unwrap_or(NONE);
         self.vacant
             .extend(numbers.filter(|&number| !self.contours[number as usize].exists));
     }
 
-    /// Number and polygon of every outer contour; without polygons where there is one only.
+    /// Number and polygon of every outer contour. The polygons are left out if there is only one contour.
     fn outlines(&self, plane: &Plane<'_>, height: f64, several: bool) -> Vec<(u32, Vec<[f64; 2]>)> {
         let outers = self
             .present

@@ -1,18 +1,19 @@
-//! How many offsets show a profile up to each area, exactly, where areas are quadratics of the offset.
+//! The length of the offsets that show a profile up to each area: exact, because areas are quadratic functions of the
+//! offset.
 
-/// Lengths of offsets by area, for areas up to given bounds, and the first moments.
+/// Length of the offsets whose profile area is at most each of the given bounds, and the first moments of the area.
 #[derive(Clone, Debug)]
 pub(crate) struct DepthMeasure {
     /// Increasing areas, from 0 on; the last one is A_max.
     bounds: Vec<f64>,
-    /// Length that is below bound k but not below k − 1 over its whole piece.
+    /// Length of the pieces that lie entirely below bound k but not below bound k − 1.
     from: Vec<f64>,
-    /// Length below bound k of pieces that cross it.
+    /// Length below bound k of the pieces that cross it.
     crossing: Vec<f64>,
     pub(crate) moments: Moments,
-    /// Where the last bound was found.
+    /// Index where the last bound was found.
     near: usize,
-    /// Everything as it was at [`begin`](Self::begin).
+    /// The state at [`begin`](Self::begin).
     kept: Kept,
 }
 
@@ -23,7 +24,7 @@ struct Kept {
     moments: Moments,
 }
 
-/// ∫ over offsets of what a section shows.
+/// Integrals over the offsets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moments {
     /// Profiles.
@@ -34,7 +35,7 @@ pub(crate) struct Moments {
     pub(crate) area: f64,
     /// Squared area of each profile.
     pub(crate) area_squared: f64,
-    /// Squared area of all profiles of the section together.
+    /// Squared total area of the section.
     pub(crate) total_squared: f64,
     /// Largest area met.
     pub(crate) largest: f64,
@@ -53,14 +54,14 @@ impl DepthMeasure {
         }
     }
 
-    /// Remembers what has been added so far.
+    /// Saves the present state.
     pub(crate) fn begin(&mut self) {
         self.kept.from.clone_from(&self.from);
         self.kept.crossing.clone_from(&self.crossing);
         self.kept.moments = self.moments;
     }
 
-    /// Takes away what was added since [`begin`](Self::begin).
+    /// Restores the state at [`begin`](Self::begin).
     pub(crate) fn undo(&mut self) {
         self.from.clone_from(&self.kept.from);
         self.crossing.clone_from(&self.kept.crossing);
@@ -84,7 +85,7 @@ impl DepthMeasure {
     fn add_lengths(&mut self, [a, b, c]: [f64; 3], length: f64) {
         self.moments.profiles += length;
         self.moments.area += length * (a + length * (0.5 * b + length * c * (1.0 / 3.0)));
-        // The turn lies within where the slope changes its sign.
+        // The extremum lies inside if the slope changes its sign.
         let slope = b + 2.0 * c * length;
         if b * slope < 0.0 {
             let turn = -0.5 * b / c;
@@ -106,32 +107,32 @@ impl DepthMeasure {
         let end = a + length * (b + length * c);
         let (least, most) = if a < end { (a, end) } else { (end, a) };
         self.moments.largest = self.moments.largest.max(most);
-        // The last bound is A_max: everything is below it, should rounding lift a section above, too.
+        // The last bound is A_max: everything counts as below it, even if rounding puts an area slightly above.
         let last = self.bounds.len() - 1;
         let start = self.first_not_below(least);
         let sign = 1.0_f64.copysign(end - a);
-        // On a falling stretch what is below the bound comes after the root.
+        // Where the area decreases, the part below the bound follows the root.
         let (offset, turned) = if end > a { (0.0, 1.0) } else { (length, -1.0) };
         let stop = start
             + self.bounds[start..last]
                 .iter()
                 .take_while(|bound| **bound < most)
                 .count();
-        // Without a way out of the loop several roots are taken at once.
+        // A loop without early exit is vectorised.
         for (bound, crossing) in self.bounds[start..stop].iter().zip(&mut self.crossing[start..stop]) {
-            // The root on the monotone stretch; b and the root have the sign of the direction, so nothing cancels.
+            // The root on the monotone piece: b and the square root have the same sign, so no digits cancel.
             let rise = bound - a;
             let slope = b + sign * (b * b + 4.0 * c * rise).max(0.0).sqrt();
-            // Nothing over nothing, where the stretch begins level at the bound, becomes nothing.
+            // 0 / 0, where the piece starts level at the bound, becomes 0.
             let t = (2.0 * rise / slope).max(0.0).min(length);
             *crossing += offset + turned * t;
         }
         self.from[stop] += length;
-        // The next stretch begins where this one ends.
+        // The next piece begins where this one ends.
         self.near = if end > a { stop } else { start };
     }
 
-    /// The first bound that is not below an area: near the last one found as a rule, for areas are continuous.
+    /// The first bound that is not below an area. It is usually near the last one found, because areas are continuous.
     fn first_not_below(&mut self, area: f64) -> usize {
         let last = self.bounds.len() - 1;
         let mut k = self.near;
@@ -149,7 +150,7 @@ impl DepthMeasure {
         self.near
     }
 
-    /// Length of offsets with a profile of area up to each bound.
+    /// Length of the offsets with a profile area up to each bound.
     pub(crate) fn cumulative(&self) -> Vec<f64> {
         let mut whole = 0.0;
         self.from

@@ -1,9 +1,10 @@
-//! Directions spread evenly over the half-sphere, turned at random for an error bar.
+//! Directions spread evenly over the half-sphere.
 
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// Fibonacci lattice of `count` directions on the upper half-sphere. A direction and its opposite cut the same sections, so half is enough.
+/// Fibonacci lattice of `count` directions on the upper half-sphere. A direction and its opposite give the same
+/// sections, so half a sphere is enough.
 pub(crate) fn half_sphere(count: usize) -> impl Iterator<Item = Vector3<f64>> {
     let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |k| {

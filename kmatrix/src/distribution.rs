@@ -1,4 +1,4 @@
-//! The distribution of relative profile sizes, x = √(A / A_max), as a function that can be asked anywhere.
+//! The cumulative distribution of relative profile sizes, x = √(A / A_max).
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -20,12 +20,12 @@ pub(crate) fn gauss_8(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 
     GAUSS_8.iter().map(|&(x, w)| w * f(centre + half * x)).sum::<f64>() * half
 }
 
-/// F(x): the share of profiles with √(A / A_max) ≤ x.
+/// F(x): the fraction of the profiles with √(A / A_max) ≤ x.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Distribution {
     /// 1 − √(1 − x²), exactly.
     Sphere,
-    /// Values at steps of θ = asin x, joined by monotone cubics.
+    /// Values at nodes of θ = asin x, interpolated by monotone cubics.
     Table(Table),
 }
 
@@ -68,7 +68,7 @@ impl Distribution {
                     0.5 * ((b - a) * (b + a) - b * at_b + a * at_a + d * d * ((b + at_b) / (a + at_a)).ln())
                 }
                 Self::Table(table) => {
-                    // With D = d / sin θ the root-like end at D = d becomes smooth: ∫ d² F cos θ / sin³ θ dθ.
+                    // With D = d / sin θ the square-root singularity at D = d disappears: ∫ d² F cos θ / sin³ θ dθ.
                     let (from, to) = ((d / b).asin(), (d / a).min(1.0).asin());
                     let panels = ((b / a).ln() / 0.25).ceil().clamp(1.0, 400.0);
                     let ratio = (to / from).powf(1.0 / panels);
@@ -88,7 +88,7 @@ impl Distribution {
     }
 }
 
-/// Values of F at increasing angles θ = asin x from 0 to π/2, joined by monotone cubics (Steffen 1990).
+/// Values of F at increasing angles θ = asin x from 0 to π/2, interpolated by monotone cubics (Steffen 1990).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
     angles: Vec<f64>,
@@ -166,7 +166,7 @@ mod tests {
     }
 
     proptest! {
-        /// What a table of the sphere's distribution answers between its nodes is the sphere's distribution.
+        /// Between its nodes a table of the sphere's distribution agrees with the closed form.
         #[test]
         fn table_agrees_with_closed_form(x in 0.0..1.0_f64) {
             assert_abs_diff_eq!(tabulated_sphere(512).at(x), Distribution::Sphere.at(x), epsilon = 1e-8);
@@ -179,7 +179,7 @@ mod tests {
             assert_abs_diff_eq!(table.size_integral(d, a, a + width), exact.size_integral(d, a, a + width), epsilon = 1e-7);
         }
 
-        /// And the closed form is what the midpoint rule tends to.
+        /// The closed form agrees with the midpoint rule.
         #[test]
         fn sphere_size_integral_agrees_with_midpoint_rule(d in 0.01..1.2_f64, a in 0.0..1.0_f64, width in 0.01..1.0_f64) {
             let steps = 20_000;

@@ -1,4 +1,4 @@
-//! Sections of ellipsoids: closed in depth for every direction, smooth quadrature over directions.
+//! Sections of ellipsoids: closed form over depth for every direction, quadrature over directions.
 
 use crate::distribution::{Distribution, Table, gauss_8};
 use std::f64::consts::FRAC_PI_2;
@@ -16,10 +16,10 @@ pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> Distribution {
     let mut axes = semi_axes;
     axes.sort_by(f64::total_cmp);
     let [c, b, a] = axes;
-    // Only the proportions matter; with c = 1 nothing overflows.
+    // Only the proportions matter. With c = 1 nothing overflows.
     let ellipsoid = Proportions { b: b / c, a: a / c };
     let mean_half_width = ellipsoid.mean(f64::INFINITY);
-    // F bends where the sections across an axis stop: at x² = c / a and c / b. Nodes crowd there and at both ends.
+    // F has kinks at the sections across the axes, x² = c / a and c / b. Nodes are denser there and at both ends.
     let mut bends = vec![0.0, (c / a).sqrt().asin(), (c / b).sqrt().asin(), FRAC_PI_2];
     bends.dedup_by(|next, last| *next - *last < 1e-6);
     let mut angles = vec![0.0];
@@ -46,7 +46,7 @@ pub(crate) fn distribution(semi_axes: [f64; 3], cells: usize) -> Distribution {
 pub(crate) fn mean_reciprocal_half_width(semi_axes: [f64; 3]) -> f64 {
     let unit = semi_axes.iter().copied().fold(0.0, f64::max);
     let [mut x, mut y, mut z] = semi_axes.map(|a| (a / unit) * (a / unit));
-    // Duplication halves the spread of x, y, z until their mean says it all.
+    // Each duplication step reduces the spread of x, y, z to a quarter, until only their mean matters.
     for _ in 0..60 {
         let lambda = (x * y).sqrt() + (y * z).sqrt() + (z * x).sqrt();
         [x, y, z] = [x, y, z].map(|t| 0.25 * (t + lambda));
@@ -63,8 +63,8 @@ struct Proportions {
 impl Proportions {
     /// ⟨w √max(0, 1 − w / limit)⟩ over directions; infinite limit: ⟨w⟩.
     ///
-    /// The integrand ends like a root where w = limit, and bends sharply near the long axis of a slender body: both integrals run over
-    /// [`smooth_step`]s, which are flat at both ends.
+    /// The integrand has a square-root end where w = limit, and a sharp bend near the long axis of a slender body. Both
+    /// integrals use the substitution [`smooth_step`], whose slope is zero at both ends.
     fn mean(&self, limit: f64) -> f64 {
         // In the plane of the two long axes the half-width is g(φ), from b (φ = π/2) to a (φ = 0).
         let spread = (self.a - self.b) * (self.a + self.b);

@@ -1,4 +1,4 @@
-//! The section law of any body: exact in depth, low-discrepancy directions, an error bar from random rotations.
+//! The section law of any body: exact over depth, low-discrepancy directions, standard error from random rotations.
 
 use crate::depth_measure::{DepthMeasure, Moments};
 use crate::directions::half_sphere;
@@ -17,12 +17,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_metrics::Progress;
 use stereology_shape::{Body, BodyKind, ClosedMesh, isotropic_rotation};
 
-/// How much work a section law is worth.
+/// When the computation of a section law ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effort {
     /// Until the largest standard error of the matrix is at most this.
     Tolerance(f64),
-    /// About this many directions in all: at least one a rotation.
+    /// About this many directions in total, at least one per rotation.
     Directions(usize),
 }
 
@@ -37,11 +37,12 @@ pub enum Effort {
 pub struct SectionOptions {
     /// Tolerance or number of directions.
     pub effort: Effort,
-    /// Bins of the matrix whose standard error the tolerance is for.
+    /// Number of bins of the matrix whose standard error the tolerance applies to.
     pub bins: usize,
     /// Random rotations of the directions; fewer than 32 make the standard error itself uncertain.
     pub rotations: usize,
-    /// Cells of the table that holds F, beside the nodes that make the matrix of `bins` exact; `None`: as many as the effort is worth.
+    /// Cells of the table of F, besides the nodes that make the matrix of `bins` bins exact; `None`: as many as the
+    /// effort requires.
     pub cells: Option<usize>,
     /// Seed of the rotations.
     pub seed: u64,
@@ -100,26 +101,26 @@ pub enum SectionLawError {
     /// Too few directions, rotations, sections or cells.
     #[error("{what}: {given} given, at least {least} needed")]
     TooFew {
-        /// What there is too little of.
+        /// The quantity.
         what: &'static str,
-        /// How many were asked for.
+        /// Requested number.
         given: usize,
-        /// How many it takes.
+        /// Smallest possible number.
         least: usize,
     },
     /// Too many of something.
     #[error("{what}: {given} given, at most {most} can be handled")]
     TooMany {
-        /// What there is too much of.
+        /// The quantity.
         what: &'static str,
-        /// How many were asked for.
+        /// Requested number.
         given: usize,
-        /// How many can be.
+        /// Largest possible number.
         most: usize,
     },
     /// The tolerance was not reached with the largest number of directions.
     #[error(
-        "a standard error of {reached} after {directions} directions, {asked} was asked for: ask for a larger tolerance"
+        "the standard error is {reached} after {directions} directions, but {asked} was requested: use a larger tolerance"
     )]
     NotReached {
         /// The standard error that was reached.
@@ -129,30 +130,32 @@ pub enum SectionLawError {
         /// Directions used.
         directions: usize,
     },
-    /// The body shows no section, so there is nothing to count.
-    #[error("no plane that was tried cuts the body: its volume is too small for its extent")]
+    /// No sampled plane cuts the body.
+    #[error("no sampled plane cuts the body: its volume is too small for its extent")]
     NoSections,
-    /// The caller broke off.
+    /// The caller cancelled.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Directions beyond which a tolerance counts as out of reach.
+/// A tolerance that needs more directions than this is out of reach.
 const MOST_DIRECTIONS: f64 = 4e6;
 
 impl SectionLaw {
-    /// The section law of any body: closed form for spheres and ellipsoids, exact in depth for meshes.
+    /// The section law of any body: closed form for spheres and ellipsoids, exact over depth for meshes.
     ///
-    /// For a mesh and a direction, the measure of depths that show a profile of each size is computed exactly by a sweep over the sorted
-    /// vertices; only the mean over directions is left. It is taken over a Fibonacci lattice, once for each of
-    /// [`SectionOptions::rotations`] random rotations, whose spread gives the standard error. With a tolerance, lattices grow until the
-    /// error is within it. Cost of a direction: V log V + T, plus the length of the contours at every saddle.
+    /// For a mesh and a direction, a sweep over the sorted vertices computes exactly the length of the depths that show
+    /// a profile of each size. Only the mean over directions is estimated. It is taken over a Fibonacci lattice, once
+    /// for each of [`SectionOptions::rotations`] random rotations, whose spread gives the standard error. With a
+    /// tolerance, lattices grow until the error is within it. Complexity per direction: V log V + T for V vertices and
+    /// T triangles, plus the length of the contours at every saddle.
     ///
-    /// Same bits for same options, at any number of threads. Several disjoint bodies in one mesh are one particle that shows several profiles.
+    /// The same options give the same bits at any number of threads. Several disjoint bodies in one mesh are one
+    /// particle with several profiles.
     ///
     /// # Errors
     ///
-    /// [`SectionLawError`] for options that make no sense or a tolerance out of reach.
+    /// [`SectionLawError`] for invalid options or a tolerance out of reach.
     ///
     /// # Examples
     ///
@@ -169,7 +172,7 @@ impl SectionLaw {
         Self::of_body_with_progress(body, options, &|_| ControlFlow::Continue(()))
     }
 
-    /// [`of_body`](Self::of_body) that tells how far it is and can be cancelled.
+    /// [`of_body`](Self::of_body) with progress and cancellation.
     ///
     /// # Errors
     ///
@@ -210,7 +213,7 @@ fn check(options: &SectionOptions) -> Result<(), SectionLawError> {
     }
 }
 
-/// Cells of the table of F that an error is worth.
+/// Number of cells of the table of F.
 fn cells(options: &SectionOptions) -> usize {
     options.cells.unwrap_or(match options.effort {
         Effort::Tolerance(tolerance) if tolerance >= 3e-3 => 64,
@@ -219,7 +222,7 @@ fn cells(options: &SectionOptions) -> usize {
     })
 }
 
-/// Everything that is the same for all directions of a mesh.
+/// What all directions of a mesh share.
 struct Task<'a> {
     body: &'a Body,
     surface: Surface<'a>,
@@ -258,18 +261,19 @@ fn of_mesh(
 }
 
 impl Task<'_> {
-    /// Lattices grow until the error of the matrix is within the tolerance.
+    /// Enlarges the lattices until the error of the matrix is within the tolerance.
     fn within(&self, tolerance: f64, progress: Progress<'_>) -> Result<SectionLaw, SectionLawError> {
         let rotations = self.options.rotations;
         let (mut pass, mut count, mut expected) = (0, 8, 0.1);
         loop {
-            // Fresh rotations every time: those that happened to agree are not asked again.
+            // New rotations every time, so that rotations that agree by chance are not used again.
             let samples = self.samples(pass, count, expected, progress)?;
             let reached = self.nodes.largest_error(&samples);
             if reached <= tolerance {
                 return self.law(&samples, count);
             }
-            // Errors fall about as the number of directions for bodies with faces, faster for smooth ones.
+            // The error is about inversely proportional to the number of directions for bodies with faces, and
+            // decreases faster for smooth ones.
             let growth = (1.15 * reached / tolerance).powf(1.1);
             let needed = growth * (count * rotations) as f64;
             if needed.is_nan() || needed > MOST_DIRECTIONS {
@@ -285,7 +289,7 @@ impl Task<'_> {
         }
     }
 
-    /// One sample a rotation, each over `count` directions.
+    /// One sample per rotation, each over `count` directions.
     fn samples(
         &self,
         pass: u64,
@@ -343,7 +347,7 @@ impl Task<'_> {
             effective_error: error(|moments| moments.holes) * reach,
         };
         let apart = (mean(|moments| moments.profiles - moments.holes) - chi / reach).abs();
-        // Heights are rounded, and where edges are level so are counts.
+        // Heights are rounded, so counts have a rounding error where edges are level.
         let chi_discrepancy = apart / error(|moments| moments.profiles - moments.holes).max(1e-7);
         let directions = count * self.options.rotations;
         let law = SectionLaw::from_samples(self.body, samples, &self.nodes.angles, lengths, reach, directions)?;
@@ -351,15 +355,16 @@ impl Task<'_> {
     }
 }
 
-/// The angles θ = asin x at which F is known, and where among them the ratios i / j of a matrix's bins are: there nothing is interpolated.
+/// The angles θ = asin x at which F is known. The ratios i / j of a matrix's bins are among them, so that the matrix
+/// needs no interpolation.
 pub(crate) struct Nodes {
     pub(crate) angles: Vec<f64>,
     bins: usize,
-    /// The node of ratio i / j, 1 ≤ i ≤ j, at (j − 1) j / 2 + i − 1; empty for many bins.
+    /// The node of ratio i / j, 1 ≤ i ≤ j, at index (j − 1) j / 2 + i − 1; empty for many bins.
     ratios: Vec<usize>,
 }
 
-/// More bins than this have more ratios than a table is worth.
+/// With more bins than this the ratios would need too many nodes.
 const MOST_EXACT_BINS: usize = 40;
 
 impl Nodes {
@@ -377,7 +382,7 @@ impl Nodes {
         if exact {
             angles.extend(pairs().map(|(i, j)| ratio(i, j)));
             angles.sort_by(f64::total_cmp);
-            // 2 / 4 and 1 / 2 are the same bits; an equal angle this near would make a cell of nothing.
+            // 2 / 4 and 1 / 2 have the same bits; an equal angle closer than this would make an empty cell.
             angles.dedup_by(|next, last| *next - *last < 1e-9);
             let last = angles.len() - 1;
             angles[last] = FRAC_PI_2;
@@ -405,7 +410,7 @@ impl Nodes {
             return f64::INFINITY;
         };
         let mut largest = 0.0_f64;
-        // Differences of F between two nodes, the first of which may be zero itself.
+        // Differences of F between two nodes; `None` stands for F(0) = 0.
         let mut spread = |from: Option<usize>, to: usize, scale: f64| {
             let at = |sample: &Sample| {
                 shares.of_sample(sample, to) - from.map_or(0.0, |from| shares.of_sample(sample, from))
@@ -415,7 +420,7 @@ impl Nodes {
             largest = largest.max(scale * scale * squares);
         };
         if self.ratios.is_empty() {
-            // Many bins: differences of F over equal steps of x are at most those between nodes as far apart.
+            // Many bins: differences of F over equal steps of x are at most those between nodes at the same distance.
             let table: Vec<usize> = (0..=self.bins)
                 .map(|i| {
                     self.angles
@@ -453,9 +458,10 @@ fn next_count(count: usize, growth: f64) -> usize {
 
 /// F at the nodes: the ratio of sums over all rotations.
 ///
-/// Not the mean of the ratios of single rotations: with few directions each, the mean length of offsets of one rotation goes with what it
-/// shows, a bias that no number of rotations removes. The ratio of the sums is off by the product of two standard errors only. How far each
-/// rotation is from it is told to first order: F + (below − F whole) / mean whole.
+/// The mean of the ratios of single rotations would have a bias that no number of rotations removes, because with few
+/// directions the mean length of the offsets of a rotation is correlated with its profiles. The error of the ratio of
+/// sums is only of the order of the product of two standard errors. The deviation of each rotation is given to first
+/// order: F + (below − F whole) / mean whole.
 struct Shares {
     mean: Vec<f64>,
     whole: f64,
@@ -473,7 +479,7 @@ impl Shares {
             return Err(SectionLawError::NoSections);
         }
         let mut mean: Vec<f64> = below.iter().map(|below| below / whole).collect();
-        // F(0) = 0: sections without area are none.
+        // F(0) = 0: a section without area is not a profile.
         mean[0] = 0.0;
         Ok(Self { mean, whole })
     }
@@ -489,7 +495,7 @@ impl Shares {
 }
 
 impl SectionLaw {
-    /// A law from samples at these angles; lengths of the samples are in units of `unit`.
+    /// A law from samples at these angles. Lengths of the samples are in units of `unit`.
     pub(crate) fn from_samples(
         body: &Body,
         samples: &[Sample],
@@ -500,7 +506,7 @@ impl SectionLaw {
     ) -> Result<Self, SectionLawError> {
         let shares = Shares::of(samples)?;
         let mut highest = 0.0_f64;
-        // Sums of lengths do not decrease but for rounding.
+        // Sums of lengths decrease only by rounding.
         let values = shares.mean.iter().map(|share| {
             highest = highest.max(*share);
             highest

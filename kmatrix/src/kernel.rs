@@ -1,4 +1,4 @@
-//! Absolute kernels, in units of length, for any bins: what unfolding takes.
+//! Absolute kernels, in units of length, for any bins: the input of unfolding.
 
 use crate::section_law::SectionLaw;
 use nalgebra::DMatrix;
@@ -7,29 +7,31 @@ use stereology_metrics::{EdgesError, check_edges};
 /// Which sizes the particles of a size bin have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sizes {
-    /// All at the bin's upper edge: the paper's. Right for sizes exactly there; otherwise a bias that no amount of data removes
-    /// (total 2-8 % low on the paper's figure 7).
+    /// All at the bin's upper edge, as in the paper. Correct for sizes that are exactly there; otherwise it has a bias
+    /// that no amount of data removes (the total is 2-8 % low on the paper's figure 7).
     UpperEdge,
     /// Spread evenly over the bin.
     #[default]
     Integrated,
 }
 
-/// What is counted for a plane that cuts a particle.
+/// What is counted when a plane cuts a particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Counting {
     /// Every disjoint profile: N_A = H_eff K N_V.
     #[default]
     Profiles,
-    /// The paper's normalisation: N_A = H K N_V with the mean caliper of the hull and columns that sum to j / n, eqs. (5), (6). It loses the
-    /// count of profiles per hit m: number densities of non-convex bodies come out m times too large (torus 1.4, L 1.1), and mixtures in wrong
-    /// proportions. Equal to [`Counting::Profiles`] for convex bodies.
+    /// The paper's normalisation: N_A = H K N_V with the mean caliper of the hull and columns that sum to j / n, eqs.
+    /// (5), (6). It ignores the number m of profiles per hit: number densities of non-convex bodies are m times too
+    /// large (torus 1.4, L 1.1), and the proportions of mixtures are wrong. Equal to [`Counting::Profiles`] for convex
+    /// bodies.
     Paper,
 }
 
 impl SectionLaw {
-    /// Kernel in units of length: entry (i, j) is the expected number of profiles per unit area in profile bin i of one particle per unit
-    /// volume in size bin j. Bins are (a, b]; both sizes are diameters of circles: of the profile's area, of the largest section's area.
+    /// Kernel in units of length: entry (i, j) is the expected number of profiles per unit area in profile bin i of one
+    /// particle per unit volume in size bin j. Bins are (a, b]; both sizes are diameters of circles: of the profile's
+    /// area, of the largest section's area.
     ///
     /// # Formula
     ///
@@ -39,8 +41,8 @@ impl SectionLaw {
     /// Integrated: K[i][j] = h / (b_j − a_j) ∫ D (F(d_i / D) − F(d_{i−1} / D)) dD over (a_j, b_j], F = 1 beyond 1
     /// ```
     ///
-    /// With [`Counting::Profiles`]; see [`kernel_counting`](Self::kernel_counting) for the paper's normalisation. The cost is one table lookup
-    /// (`UpperEdge`) or some tens (`Integrated`) an entry.
+    /// This uses [`Counting::Profiles`]; see [`kernel_counting`](Self::kernel_counting) for the paper's normalisation.
+    /// The cost per entry is one table lookup (`UpperEdge`) or some tens (`Integrated`).
     ///
     /// # Errors
     ///
@@ -60,7 +62,7 @@ impl SectionLaw {
         self.kernel_counting(profile_edges, size_edges, sizes, Counting::Profiles)
     }
 
-    /// [`kernel`](Self::kernel) with what is counted chosen by name.
+    /// [`kernel`](Self::kernel) with a choice of what is counted.
     ///
     /// # Errors
     ///
@@ -78,7 +80,7 @@ impl SectionLaw {
             Counting::Profiles => self.caliper_effective(),
             Counting::Paper => self.caliper_hull(),
         } / self.size();
-        // Expected length, at size 1, of offsets that show a profile up to the edge d.
+        // Expected length of the offsets, at size 1, that show a profile up to the edge d.
         let below = |d: f64, j: usize| {
             let (a, b) = (size_edges[j], size_edges[j + 1]);
             match sizes {
@@ -90,7 +92,7 @@ impl SectionLaw {
         for j in 0..kernel.ncols() {
             let mut last = below(profile_edges[0], j);
             for i in 0..kernel.nrows() {
-                // Profiles are never larger than the particle: exactly nothing, not a rounding error.
+                // Profiles are never larger than the particle: exactly zero, not a rounding error.
                 if profile_edges[i] >= size_edges[j + 1] {
                     break;
                 }

@@ -1,16 +1,16 @@
-//! Stereological kernels: how often a random section shows a particle of each size as a profile of each size.
+//! Stereological kernels: what profile sizes does a random section through a particle of each size give?
 //!
-//! A plane cuts a particle in proportion to its caliper, and shows a profile anywhere between a point and its largest section. For a body of
-//! any shape one function holds all of that, the [`SectionLaw`]:
+//! The probability that a plane cuts a particle is proportional to its mean caliper diameter. The profile is anything
+//! between a point and the largest section. For a body of any shape one function describes this, the [`SectionLaw`]:
 //!
 //! ```text
 //! F(x) = ⟨profiles with √(A / A_max) ≤ x⟩ / ⟨profiles⟩        ⟨·⟩ = (1/4π) ∫ over directions, ∫ over offsets
 //! N_A  = H_eff K N_V,   K[i][j] = (j/n) (F(i/j) − F((i−1)/j))   H_eff = ⟨profiles⟩
 //! ```
 //!
-//! Spheres and ellipsoids have it in closed form. For a closed mesh and one direction the area of a section is piecewise quadratic in the offset,
-//! so the measure of offsets with a profile of each size is exact; only the mean over directions is left to estimate, and its standard error comes
-//! from random rotations of a lattice of directions.
+//! Spheres and ellipsoids have closed forms. For a closed mesh and one direction the section area is a piecewise
+//! quadratic function of the offset, so the length of the offsets with a profile of each size is exact. Only the mean
+//! over directions is estimated. Its standard error comes from random rotations of a lattice of directions.
 //!
 //! # A kernel for unfolding
 //!
@@ -25,7 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # How many profiles does a plane show that hits a torus?
+//! # How many profiles does a section of a torus have?
 //!
 //! ```
 //! use stereology_kmatrix::{SectionLaw, SectionOptions};
@@ -39,10 +39,11 @@
 //!
 //! # Why not Monte Carlo
 //!
-//! The paper takes 100,000 random sections for 0.5 %. It is here as [`SectionLaw::monte_carlo`], by polygons or by the paper's own stencil
-//! buffer, and judges the sweep in the tests; the sweep reaches 0.01 % of 1,280 triangles in 0.5 s on one core. The paper also loses the number
-//! of profiles per hit of bodies that are not convex ([`Counting::Paper`]): 1.4 to 1.5 for a torus, and number densities come out as many
-//! times too large.
+//! The paper needs 100,000 random sections for an error of 0.5 %. Its method is available as
+//! [`SectionLaw::monte_carlo`], with polygons or with the paper's stencil buffer, and is the reference for the sweep in
+//! the tests. The sweep reaches 0.01 % for 1,280 triangles in 0.5 s on one core. The paper also ignores that a plane
+//! that hits a non-convex body shows more than one profile ([`Counting::Paper`]): 1.4 to 1.5 for a torus. Number
+//! densities are then too large by that factor.
 
 mod contour_area;
 mod contours;

@@ -1,4 +1,5 @@
-//! The paper's way: random sections, one by one, by polygons or by pixels (section 3.2). Slow, simple, and the judge of the exact sweep.
+//! The paper's method: random sections one by one, as polygons or pixels (section 3.2). It is slow and simple, and the
+//! reference for the exact sweep.
 
 use crate::depth_measure::Moments;
 use crate::distribution::Table;
@@ -19,10 +20,11 @@ use stereology_shape::{Body, BodyKind, TriangleMesh};
 /// Which area counts as the largest, A_max.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LargestArea {
-    /// The body's own, found by maximisation.
+    /// The body's largest section, found by maximisation.
     #[default]
     OfBody,
-    /// The largest the random sections met, as in the paper: always too small (a cube's by 1.8 % after 10,000 sections).
+    /// The largest area among the random sections, as in the paper: always too small (by 1.8 % for a cube after 10,000
+    /// sections).
     Encountered,
 }
 
@@ -32,11 +34,11 @@ pub enum Slicing {
     /// Exact polygons.
     #[default]
     Polygons,
-    /// The paper's: the surface beyond the plane is drawn into a square picture that holds the whole body, pixels drawn an odd number of
-    /// times are inside, regions of pixels that touch by their sides are profiles. Small profiles are lost between pixels, near ones run
-    /// together.
+    /// The paper's method: the surface beyond the plane is drawn into a square image that contains the whole body.
+    /// Pixels drawn an odd number of times are inside, and 4-connected components of such pixels are profiles. Profiles
+    /// smaller than a pixel are lost, and profiles close together merge.
     Raster {
-        /// Pixels along a side of the picture, at least 8.
+        /// Pixels along a side of the image, at least 8.
         resolution: usize,
     },
 }
@@ -44,18 +46,18 @@ pub enum Slicing {
 /// Options of [`SectionLaw::monte_carlo`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MonteCarloOptions {
-    /// Sections that hit the body; the paper took 100,000.
+    /// Sections that hit the body; the paper used 100,000.
     pub iterations: usize,
     /// Seed.
     pub seed: u64,
-    /// What A_max is.
+    /// Definition of A_max.
     pub largest: LargestArea,
     /// How a section is measured.
     pub slicing: Slicing,
 }
 
 impl Default for MonteCarloOptions {
-    /// The paper's 100,000 sections, with the body's own A_max.
+    /// The paper's 100,000 sections, with the body's A_max.
     fn default() -> Self {
         Self {
             iterations: 100_000,
@@ -98,10 +100,10 @@ impl MonteCarloOptions {
 
 /// Batches whose spread gives the standard error.
 const BATCHES: usize = 32;
-/// Planes that miss for every one that is asked to hit, before a body counts as not there.
+/// The search is given up when more than this number of planes per required hit have been tried.
 const PATIENCE: usize = 10_000;
 
-/// What one batch of random planes met.
+/// The sections of one batch of random planes.
 struct Batch {
     areas: Vec<f64>,
     hits: usize,
@@ -111,12 +113,13 @@ struct Batch {
 }
 
 impl SectionLaw {
-    /// The law by isotropic uniform random sections: random direction, random offset within the body's bounding sphere, planes that miss thrown
-    /// again; every disjoint profile counts.
+    /// The law from isotropic uniform random sections: random direction, random offset within the body's bounding
+    /// sphere; planes that miss are drawn again; every disjoint profile counts.
     ///
-    /// Offsets are uniform over the same length for every direction. Uniform within the body's own extent they would not be isotropic uniform
-    /// random: wide directions have to count more, or the last column of K is wrong by 0.03 to 0.08.
-    /// [`caliper_hull`](Self::caliper_hull) and [`caliper_effective`](Self::caliper_effective) come from the same loop. Cost: iterations × T.
+    /// Offsets are uniform over the same length for every direction. Offsets uniform within the body's own extent would
+    /// not be isotropic uniform random: wide directions must count more, otherwise the last column of K is wrong by
+    /// 0.03 to 0.08. [`caliper_hull`](Self::caliper_hull) and [`caliper_effective`](Self::caliper_effective) come from
+    /// the same loop. Complexity: iterations × triangles.
     ///
     /// # Errors
     ///
@@ -134,7 +137,7 @@ impl SectionLaw {
         Self::monte_carlo_with_progress(body, options, &|_| ControlFlow::Continue(()))
     }
 
-    /// [`monte_carlo`](Self::monte_carlo) that tells how far it is and can be cancelled.
+    /// [`monte_carlo`](Self::monte_carlo) with progress and cancellation.
     ///
     /// # Errors
     ///
@@ -162,7 +165,7 @@ impl SectionLaw {
                 let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
                 rng.set_stream(task as u64);
                 let mut slicer = Slicer::new(body, &triangles, radius, options.slicing);
-                let batch = throw_planes(&mut slicer, radius, wanted, &mut rng)?;
+                let batch = draw_planes(&mut slicer, radius, wanted, &mut rng)?;
                 let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / BATCHES as f64;
                 if progress(share).is_break() {
                     Err(SectionLawError::Cancelled)
@@ -181,7 +184,8 @@ impl SectionLaw {
             LargestArea::OfBody => body.largest_section_area(),
             LargestArea::Encountered => met,
         };
-        // Planes of all offsets in the bounding sphere: a share of them is that share of its diameter.
+        // Offsets are uniform over the diameter of the bounding sphere: a fraction of the planes is that fraction of
+        // the diameter.
         let length = |count: usize, batch: &Batch| 2.0 * radius * count as f64 / batch.planes as f64;
         let mean = |of: &dyn Fn(&Batch) -> f64| batches.iter().map(of).sum::<f64>() / BATCHES as f64;
         let profiles = |batch: &Batch| length(batch.areas.len(), batch);
@@ -236,7 +240,7 @@ fn check_slicing(slicing: Slicing) -> Result<(), SectionLawError> {
     }
 }
 
-/// What is drawn; nothing where polygons are cut.
+/// The triangles to draw; empty for polygons.
 fn triangles(body: &Body, slicing: Slicing) -> TriangleMesh {
     match slicing {
         Slicing::Polygons => TriangleMesh::default(),
@@ -282,17 +286,17 @@ impl<'a> Slicer<'a> {
 pub struct Residual {
     /// Random sections that hit.
     pub iterations: usize,
-    /// For each of the bins of √(A / A_max): the share of profiles counted in it less the law's. The paper found it below 0.005 for each
-    /// bin within 100,000 iterations.
+    /// For each bin of √(A / A_max): the fraction of the profiles counted in it minus that of the law. The paper found
+    /// it below 0.005 in every bin within 100,000 iterations.
     pub per_bin: Vec<f64>,
 }
 
-/// Sections between two looks at the histogram.
+/// Sections between two evaluations of the histogram.
 const BLOCK: usize = 500;
 
 impl SectionLaw {
-    /// How the paper's histogram of the largest particle's profiles (the last column of K) comes near this law while random sections of
-    /// `body` are counted: its residual after 500, 1000, ... sections.
+    /// Convergence of the paper's histogram of the largest particle's profiles (the last column of K) to this law: its
+    /// residual after 500, 1000, ... random sections of `body`.
     ///
     /// # Errors
     ///
@@ -325,7 +329,7 @@ impl SectionLaw {
                 |slicer, block| {
                     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
                     rng.set_stream(block as u64);
-                    let batch = throw_planes(slicer, radius, BLOCK, &mut rng)?;
+                    let batch = draw_planes(slicer, radius, BLOCK, &mut rng)?;
                     let mut histogram = vec![0.0; bins];
                     for area in batch.areas {
                         let x = (area / self.max_area).sqrt();
@@ -359,7 +363,7 @@ impl SectionLaw {
     }
 }
 
-fn throw_planes(
+fn draw_planes(
     slicer: &mut Slicer<'_>,
     radius: f64,
     wanted: usize,
@@ -372,7 +376,8 @@ fn throw_planes(
         planes: 0,
         total_squared: 0.0,
     };
-    // Until one hit more than wanted, which is not counted: stopping at a hit would make hits seem more frequent than they are.
+    // The loop ends at one hit more than required, which is not counted: stopping at a counted hit would make hits seem
+    // more frequent than they are.
     loop {
         if batch.planes > PATIENCE * wanted {
             return Err(SectionLawError::NoSections);
@@ -390,7 +395,7 @@ fn throw_planes(
     }
 }
 
-/// The batch's profiles up to the area of every node, as lengths of offsets.
+/// The length of the offsets with a profile up to the area of every node.
 fn count_below(batch: &Batch, max_area: f64, span: f64) -> Sample {
     let mut areas = batch.areas.clone();
     areas.sort_by(f64::total_cmp);

@@ -73,7 +73,7 @@ impl<'a> Surface<'a> {
         &self.around[self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize]
     }
 
-    /// Whether walking from triangle to triangle around the vertex comes back before all were seen.
+    /// Whether a traversal of the triangles around the vertex returns to its start before all were visited.
     fn is_pinched(&self, vertex: usize) -> bool {
         let fan = &self.around[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
         let Some(&start) = fan.first() else { return false };
@@ -101,7 +101,7 @@ pub(crate) struct View<'a> {
     roles: Vec<u8>,
 }
 
-/// What a vertex is to a triangle around it.
+/// Whether a vertex is the lowest, middle or highest of a triangle.
 pub(crate) type Role = u8;
 pub(crate) const LOWEST: Role = 0;
 pub(crate) const MIDDLE: Role = 1;
@@ -117,7 +117,7 @@ impl<'a> View<'a> {
         }
     }
 
-    #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
+    #[allow(clippy::float_cmp, reason = "equal heights are ordered by index")]
     pub(crate) fn place(&mut self, direction: &Vector3<f64>) {
         self.axes = plane_axes(direction);
         self.surface.totals.place(direction, &mut self.knots);
@@ -126,7 +126,7 @@ impl<'a> View<'a> {
             let [a, b, c] = [i, j, k].map(|v| self.knots.heights[v]);
             let lower = |p: f64, v: usize, q: f64, w: usize| u8::from(p < q || (p == q && v < w));
             let (ij, jk, ki) = (lower(a, i, b, j), lower(b, j, c, k), lower(c, k, a, i));
-            // How many of the other two are below each.
+            // For each corner: how many of the other two are lower.
             *roles = ((1 - ij) + ki) | ((1 - jk) + ij) << 2 | ((1 - ki) + jk) << 4;
         }
     }
@@ -146,7 +146,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// A plane across the direction, between two vertices of the order.
+/// A plane perpendicular to the direction, between two vertices of the order.
 pub(crate) struct Plane<'a> {
     view: &'a View<'a>,
     /// Vertices at this height are below the plane if their index is below `vertex`.
@@ -159,7 +159,7 @@ impl Plane<'_> {
         Self { height, ..self }
     }
 
-    #[allow(clippy::float_cmp, reason = "level to the last bit: then the index decides")]
+    #[allow(clippy::float_cmp, reason = "equal heights are ordered by index")]
     fn is_below(&self, vertex: u32) -> bool {
         let height = self.view.knots.heights[vertex as usize];
         height < self.height || (height == self.height && vertex < self.vertex)
@@ -201,7 +201,7 @@ impl Plane<'_> {
             };
             points.push([low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1])]);
             triangle = next;
-            // A walk around a closed mesh always comes back; the bound says so to the machine.
+            // A traversal of a closed mesh always returns to its start; the bound guarantees that the loop ends.
             if triangle == start || points.len() > self.view.surface.triangles.len() {
                 return points;
             }
@@ -215,7 +215,8 @@ impl Plane<'_> {
         let place = |role: Role| (0..3).find(|k| roles >> (2 * k) & 3 == role).unwrap_or(0);
         let (lowest, middle) = (place(LOWEST), place(MIDDLE));
         let [low, mid, high] = [lowest, middle, place(HIGHEST)].map(|k| self.placed(corners[k]));
-        // Counter-clockwise seen from outside, the solid lies to the left of the step from the falling to the rising edge.
+        // Counter-clockwise seen from outside, the solid lies to the left of the step from the falling to the rising
+        // edge.
         let sign = if (lowest + 1) % 3 == middle { 0.5 } else { -0.5 };
         let run = |from: [f64; 3], to: [f64; 3]| {
             let height = to[2] - from[2];
@@ -237,7 +238,7 @@ impl Plane<'_> {
     }
 }
 
-/// Two unit vectors that make a right-handed frame with the direction.
+/// Two unit vectors that form a right-handed frame with the direction.
 fn plane_axes(direction: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let mut axis = Vector3::zeros();
     axis[direction.iamin()] = 1.0;

@@ -1,9 +1,9 @@
-//! The paper's way to cut a mesh (section 3.2): the part of the surface beyond the plane is drawn, and pixels drawn an odd number of times
-//! are inside.
+//! The paper's method to cut a mesh (section 3.2): the part of the surface beyond the plane is drawn, and pixels drawn
+//! an odd number of times are inside.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Draws sections of one mesh, keeping its buffers: a graphics card's stencil buffer in plain code.
+/// Draws sections of one mesh into reusable buffers, as a graphics card does with its stencil buffer.
 pub(crate) struct StencilBuffer<'a> {
     vertices: &'a [Point3<f64>],
     triangles: &'a [[u32; 3]],
@@ -17,7 +17,7 @@ pub(crate) struct StencilBuffer<'a> {
 }
 
 impl<'a> StencilBuffer<'a> {
-    /// A picture of `resolution` × `resolution` pixels that holds the ball of `radius` about `centre`.
+    /// An image of `resolution` × `resolution` pixels that contains the ball of `radius` about `centre`.
     pub(crate) fn new(
         vertices: &'a [Point3<f64>],
         triangles: &'a [[u32; 3]],
@@ -37,7 +37,7 @@ impl<'a> StencilBuffer<'a> {
         }
     }
 
-    /// Areas of the disjoint regions of odd pixels (joined across sides) of the section by n · x = `offset`.
+    /// Areas of the 4-connected components of odd pixels of the section by n · x = `offset`.
     pub(crate) fn profile_areas(&mut self, normal: &UnitVector3<f64>, offset: f64) -> Vec<f64> {
         let mut axis = Vector3::zeros();
         axis[normal.iamin()] = 1.0;
@@ -58,11 +58,11 @@ impl<'a> StencilBuffer<'a> {
         self.regions().into_iter().map(|count| count as f64 * pixel).collect()
     }
 
-    /// Turns every pixel whose centre the triangle covers beyond the plane.
+    /// Toggles every pixel whose centre is covered by the part of the triangle beyond the plane.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "clamped to the picture"
+        reason = "clamped to the image"
     )]
     fn draw(&mut self, corners: &[u32; 3]) {
         let placed = corners.map(|v| self.placed[v as usize]);
@@ -75,8 +75,8 @@ impl<'a> StencilBuffer<'a> {
         let high = placed.iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
         for row in first(low)..first(high) {
             let y = row as f64 + 0.5;
-            // Ends of the row in the triangle: (x, depth), from edges taken in one order by both their triangles, so that no pixel on an
-            // edge is drawn twice or left out.
+            // Ends of the row in the triangle: (x, depth). Both triangles of an edge use its ends in the same order, so
+            // that no pixel on an edge is drawn twice or left out.
             let mut ends = [[0.0; 2]; 2];
             let mut found = 0;
             for k in 0..3 {
@@ -108,7 +108,7 @@ impl<'a> StencilBuffer<'a> {
         }
     }
 
-    /// Pixels of every region of odd pixels that touch by sides; the picture is emptied.
+    /// Number of pixels of every 4-connected component of odd pixels; clears the image.
     fn regions(&mut self) -> Vec<usize> {
         let n = self.resolution;
         let mut regions = Vec::new();
@@ -149,7 +149,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
 
-        /// What pixels count is what polygons measure, to the length of the outline in pixels.
+        /// The pixel count agrees with the polygon area, up to the length of the outline in pixels.
         #[test]
         fn odd_pixels_are_the_section(x in -1.0..1.0_f64, y in -1.0..1.0_f64, z in -1.0..1.0_f64, depth in -0.9..0.9_f64) {
             prop_assume!(Vector3::new(x, y, z).norm() > 0.1);

@@ -1,4 +1,4 @@
-//! Saltikov's kernel: how often a random plane shows a sphere of each size as a profile of each size.
+//! Saltikov's kernel: what profile sizes does a random section through a sphere of each size give?
 
 use nalgebra::DMatrix;
 
@@ -10,7 +10,8 @@ use nalgebra::DMatrix;
 /// K[i][j] = (√(j² − (i−1)²) − √(j² − i²)) / n   for j ≥ i, else 0        (i, j = 1..n)
 /// ```
 ///
-/// Column `j` sums to `j / n`: large spheres are cut more often. The diagonal is positive, so the kernel can always be inverted.
+/// Column `j` sums to `j / n`: large spheres are cut more often. The diagonal is positive, so the kernel can always be
+/// inverted.
 ///
 /// # References
 ///
@@ -33,12 +34,12 @@ pub struct SphereKernel {
 
 /// A kernel needs at least one bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a kernel needs at least one bin: ask for 1 or more")]
+#[error("a kernel needs at least one bin: give 1 or more")]
 #[non_exhaustive]
 pub struct BinCountError;
 
 impl SphereKernel {
-    /// Kernel with `bins` size bins and as many profile bins. Takes `bins`² steps.
+    /// Kernel with `bins` size bins and the same number of profile bins. Complexity: `bins`².
     ///
     /// # Errors
     ///
@@ -48,7 +49,8 @@ impl SphereKernel {
             return Err(BinCountError);
         }
         let half_chord = |diameter: usize, profile: usize| {
-            // Exact in integers up to 2^26 bins; the root is of a difference of squares, never of a rounded product.
+            // Exact in integers up to 2^26 bins: the square root is of a difference of squares, not of a rounded
+            // product.
             ((diameter - profile) as f64 * (diameter + profile) as f64).sqrt()
         };
         let matrix = DMatrix::from_fn(bins, bins, |i, j| {
@@ -67,9 +69,11 @@ impl SphereKernel {
         &self.matrix
     }
 
-    /// Profiles per unit area, by bin, of a material with `number_density[j]` spheres per unit volume in bin `j`: eq. (2).
+    /// Profiles per unit area, by bin, of a material with `number_density[j]` spheres per unit volume in bin `j`: eq.
+    /// (2).
     ///
-    /// `largest_diameter` carries the unit of length. Densities beyond the number of bins are ignored, missing ones are zero.
+    /// `largest_diameter` carries the unit of length. Densities beyond the number of bins are ignored; missing
+    /// densities are zero.
     #[must_use]
     pub fn profile_densities(&self, largest_diameter: f64, number_density: &[f64]) -> Vec<f64> {
         self.matrix
@@ -79,11 +83,12 @@ impl SphereKernel {
     }
 }
 
-/// Edges of Saltikov's geometric classes, for comparison: relative diameters 10^(−0.1 k), so that classes of A / A_max fall by a factor of
-/// 0.631; from 10^(−0.1 n) up to 1. He used 12.
+/// Edges of Saltikov's geometric classes, for comparison: relative diameters 10^(−0.1 k), so that classes of A / A_max
+/// fall by a factor of 0.631; from 10^(−0.1 n) up to 1. Saltikov used 12.
 ///
-/// Prior authors took these (paper, section 3.2); the paper's equal classes of √(A / A_max) spread profiles more evenly. Give them to
-/// [`SectionLaw::kernel`](crate::SectionLaw::kernel) as both edges, times the largest size.
+/// Earlier authors used these (paper, section 3.2); the paper's equal classes of √(A / A_max) distribute the profiles
+/// more evenly. Multiplied by the largest size, they are the profile edges and size edges for
+/// [`SectionLaw::kernel`](crate::SectionLaw::kernel).
 ///
 /// ```
 /// use stereology_kmatrix::{SectionLaw, Sizes, condition_number, geometric_classes};
@@ -102,8 +107,8 @@ pub fn geometric_classes(classes: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Largest over smallest singular value of a kernel: how much unfolding may magnify relative errors of profile counts. Infinite if the
-/// kernel cannot be inverted; 1 without entries.
+/// Ratio of the largest to the smallest singular value of a kernel: the factor by which unfolding may magnify relative
+/// errors of profile counts. Infinite if the kernel is singular; 1 if it is empty.
 #[must_use]
 pub fn condition_number(kernel: &DMatrix<f64>) -> f64 {
     if kernel.is_empty() {
@@ -115,8 +120,9 @@ pub fn condition_number(kernel: &DMatrix<f64>) -> f64 {
 
 /// Profiles per unit area of particles with a mean caliper: `N_A = H N_V`, eq. (1).
 ///
-/// `mean_caliper` is a length, `number_density` particles per unit volume. Eq. (1) holds for convex particles; for others take
-/// [`SectionLaw::caliper_effective`](crate::SectionLaw::caliper_effective), which counts every disjoint profile of a hit.
+/// `mean_caliper` is a length, `number_density` is in particles per unit volume. Eq. (1) holds for convex particles;
+/// for others use [`SectionLaw::caliper_effective`](crate::SectionLaw::caliper_effective), which counts every disjoint
+/// profile.
 ///
 /// ```
 /// // Spheres of diameter 2 at three per unit volume.
@@ -127,11 +133,11 @@ pub fn profiles_per_area(mean_caliper: f64, number_density: f64) -> f64 {
     mean_caliper * number_density
 }
 
-/// Factor from the body's own units to the photograph's: `s = √(A_img / A_max)`, eq. (7).
+/// Factor from the body's unit of length to that of the photograph: `s = √(A_img / A_max)`, eq. (7).
 ///
-/// `largest_profile_area` is that of the largest profile seen, `max_area` that of the body's largest section. The largest of a few hundred
-/// profiles is smaller than the largest possible: even for particles of one size `s` comes out 2-7 % low at 500 profiles. When the largest
-/// size is known, give it instead.
+/// `largest_profile_area` is the area of the largest observed profile, `max_area` that of the body's largest section.
+/// The largest of a few hundred profiles is smaller than the largest possible one: even for particles of one size `s`
+/// is 2-7 % low with 500 profiles. Use the largest size instead if it is known.
 ///
 /// ```
 /// assert_eq!(stereology_kmatrix::scale(8.0, 2.0), 2.0);
@@ -148,7 +154,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A sphere of diameter j/n is hit by a plane in proportion to its diameter, whatever it then shows.
+        /// The probability that a plane hits a sphere of diameter j/n is proportional to its diameter, so column j sums
+        /// to j/n.
         #[test]
         fn columns_sum_to_relative_diameter(bins in 1_usize..200) {
             let kernel = SphereKernel::new(bins).unwrap();

@@ -1,10 +1,10 @@
-//! What one set of random sections measured.
+//! The measurements of one set of random sections.
 
 use crate::depth_measure::{DepthMeasure, Moments};
 
-/// What one set of directions, or one batch of random sections, saw: means over directions of lengths of offsets.
+/// Means over the directions of one set, or over one batch of random sections; lengths of offsets.
 pub(crate) struct Sample {
-    /// Offsets with a profile up to each node's area.
+    /// Length of the offsets with a profile up to the area of each node.
     pub(crate) below: Vec<f64>,
     pub(crate) moments: Moments,
 }

@@ -1,4 +1,5 @@
-//! One law gives every kernel: F(x), the share of profiles with √(A / A_max) ≤ x, and how many profiles there are.
+//! The section law, from which every kernel follows: F(x), the fraction of the profiles with √(A / A_max) ≤ x, and the
+//! number of profiles.
 
 use crate::depth_measure::Moments;
 use crate::distribution::{Distribution, Table};
@@ -9,12 +10,13 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::PI;
 use stereology_shape::{Body, BodyError, BodyKind};
 
-/// Cells of the table of F where the caller does not choose.
+/// Default number of cells of the table of F.
 pub(crate) const DEFAULT_CELLS: usize = 512;
 
-/// What random planes see of a body: the distribution of its profile sizes, and the lengths that say how many profiles there are.
+/// Random sections of a body: the distribution of its profile sizes, and the mean lengths that give the number of
+/// profiles.
 ///
-/// A profile is one connected component of body and plane; holes belong to the profile around them.
+/// A profile is one connected component of the intersection of body and plane; a hole belongs to the profile around it.
 ///
 /// # Formula
 ///
@@ -54,7 +56,7 @@ pub struct SectionLaw {
     pub(crate) chi_discrepancy: f64,
 }
 
-/// The mean lengths of the measure of planes that hit, by what is counted.
+/// Mean lengths of the offsets at which a plane hits, by what is counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Calipers {
     pub(crate) hull: f64,
@@ -93,16 +95,16 @@ impl SectionLaw {
     ///
     /// # Errors
     ///
-    /// [`BodyError`] if the diameter is no length.
+    /// [`BodyError`] if the diameter is not a positive length.
     pub fn sphere(diameter: f64) -> Result<Self, BodyError> {
         Body::sphere(diameter).map(|body| Self::sphere_of(&body))
     }
 
-    /// The law of an ellipsoid: closed in depth, by smooth quadrature over directions; F is right to about 1e-7.
+    /// The law of an ellipsoid: closed form over depth, quadrature over directions; the error of F is about 1e-7.
     ///
     /// # Errors
     ///
-    /// [`BodyError`] if a semi-axis is no length.
+    /// [`BodyError`] if a semi-axis is not a positive length.
     ///
     /// ```
     /// let needle = stereology_kmatrix::SectionLaw::ellipsoid([1.0, 1.0, 4.0])?;
@@ -155,7 +157,7 @@ impl SectionLaw {
         }
     }
 
-    /// F(x): the share of profiles with √(A / A_max) ≤ x. Zero below 0, one from 1 on.
+    /// F(x): the fraction of the profiles with √(A / A_max) ≤ x. Zero below 0, one from 1 on.
     #[must_use]
     pub fn cdf(&self, x: f64) -> f64 {
         self.distribution.at(x)
@@ -168,9 +170,11 @@ impl SectionLaw {
         standard_error(self.samples.iter().map(|table| table.at(theta)))
     }
 
-    /// The paper's kernel for `bins` equal bins: row = profile bin, column = size bin with particles at its upper edge. Column j sums to j / n.
+    /// The paper's kernel for `bins` equal bins: row = profile bin, column = size bin with particles at its upper edge.
+    /// Column j sums to j / n.
     ///
-    /// No unit: multiply by [`caliper_effective`](Self::caliper_effective) in units of the largest particle. Without bins the matrix is empty.
+    /// It has no unit: multiply by [`caliper_effective`](Self::caliper_effective) in units of the largest particle.
+    /// With zero bins the matrix is empty.
     #[must_use]
     pub fn k_matrix(&self, bins: usize) -> DMatrix<f64> {
         if self.distribution == Distribution::Sphere {
@@ -180,10 +184,11 @@ impl SectionLaw {
         matrix_of(bins, |x| self.distribution.at(x))
     }
 
-    /// Standard error of every entry of [`k_matrix`](Self::k_matrix), from the spread between random rotations; zero for closed forms.
+    /// Standard error of every entry of [`k_matrix`](Self::k_matrix), from the spread between random rotations; zero
+    /// for closed forms.
     ///
-    /// An entry that only few directions feed (sections just above the area of a face) has a skewed error that a spread cannot tell: judge
-    /// all by the [largest](Self::standard_error).
+    /// An entry to which only few directions contribute (sections just above the area of a face) has a skewed error
+    /// that the standard error does not capture. Use the [largest](Self::standard_error) for all entries.
     #[must_use]
     pub fn k_standard_errors(&self, bins: usize) -> DMatrix<f64> {
         let samples: Vec<_> = self
@@ -202,9 +207,11 @@ impl SectionLaw {
         self.k_standard_errors(bins).iter().copied().fold(0.0, f64::max)
     }
 
-    /// By how many standard errors a two-sided interval of this confidence (0..1) reaches: Student's t with one degree less than rotations.
+    /// Half-width of a two-sided interval of this confidence (0..1), in standard errors: Student's t with one degree of
+    /// freedom less than rotations.
     ///
-    /// With few rotations the normal distribution is too hopeful: with 8, four standard errors fail once in 200.
+    /// With few rotations the normal distribution gives intervals that are too narrow: with 8 rotations, four standard
+    /// errors fail once in 200.
     #[must_use]
     pub fn error_quantile(&self, confidence: f64) -> f64 {
         let freedom = self.samples.len().saturating_sub(1).max(1) as f64;
@@ -224,10 +231,10 @@ impl SectionLaw {
         self.lengths.chi
     }
 
-    /// How far the sweep's own count of profiles minus holes is from H_chi, in standard errors of the sweep.
+    /// Difference between the sweep's count of profiles minus holes and H_chi, in standard errors of the sweep.
     ///
-    /// Both are the same number for any mesh that bounds a solid. Beyond 6 the mesh cuts through itself, and neither its sections nor this law
-    /// mean anything. Zero for closed forms and Monte Carlo.
+    /// Both are equal for any mesh that bounds a solid. Beyond 6 the mesh intersects itself, and neither its sections
+    /// nor this law are meaningful. Zero for closed forms and Monte Carlo.
     #[must_use]
     pub fn chi_discrepancy(&self) -> f64 {
         self.chi_discrepancy
@@ -239,7 +246,7 @@ impl SectionLaw {
         self.lengths.effective
     }
 
-    /// Standard error of H_eff; zero for closed forms and for bodies of which no section has a hole.
+    /// Standard error of H_eff; zero for closed forms and for bodies whose sections have no holes.
     #[must_use]
     pub fn caliper_effective_standard_error(&self) -> f64 {
         self.lengths.effective_error
@@ -251,7 +258,7 @@ impl SectionLaw {
         self.lengths.effective - self.lengths.chi
     }
 
-    /// m = H_eff / H_hull: profiles a plane that hits shows on average; 1 for convex bodies.
+    /// m = H_eff / H_hull: mean number of profiles per plane that hits the body; 1 for convex bodies.
     #[must_use]
     pub fn profiles_per_hit(&self) -> f64 {
         self.lengths.effective / self.lengths.hull
@@ -263,7 +270,8 @@ impl SectionLaw {
         self.max_area
     }
 
-    /// The area of the largest profile met while the law was computed; should it exceed [`max_area`](Self::max_area), it counts in the last bin.
+    /// The area of the largest profile found while the law was computed. If it exceeds [`max_area`](Self::max_area), it
+    /// counts in the last bin.
     #[must_use]
     pub fn largest_area_met(&self) -> f64 {
         self.largest_met
@@ -281,7 +289,7 @@ impl SectionLaw {
         self.volume
     }
 
-    /// Volume of the body scaled to size 1: volume fractions from number densities by size take this.
+    /// Volume of the body scaled to size 1, for volume fractions from number densities by size.
     #[must_use]
     pub fn unit_volume(&self) -> f64 {
         self.volume / self.size().powi(3)
@@ -311,26 +319,26 @@ impl SectionLaw {
         self.squares.profile_error
     }
 
-    /// Mean area of the section a plane that hits shows, all its profiles together: V / H_hull, exact.
+    /// Mean total area of a section, all its profiles together: V / H_hull, exact.
     #[must_use]
     pub fn mean_section_area(&self) -> f64 {
         self.volume / self.lengths.hull
     }
 
-    /// Mean squared area of such a section, all its profiles together.
+    /// Mean squared total area of a section.
     #[must_use]
     pub fn mean_square_section_area(&self) -> f64 {
         self.squares.total / self.lengths.hull
     }
 
-    /// Its standard error; zero for closed forms.
+    /// Standard error of the mean squared total area; zero for closed forms.
     #[must_use]
     pub fn mean_square_section_area_standard_error(&self) -> f64 {
         self.squares.total_error / self.lengths.hull
     }
 
-    /// The body's self-energy ½ ∬ dx dy / |x − y|, which is the mean over directions of ∫ A² dh: two points of the body are in one random
-    /// plane as often as they are near each other.
+    /// The body's self-energy ½ ∬ dx dy / |x − y|, which is the mean over directions of ∫ A² dh: the density of random
+    /// planes through two points of the body is inversely proportional to their distance.
     ///
     /// Unit cube: 0.94115632; ball of radius R: 16 π² R⁵ / 15.
     ///
@@ -345,13 +353,14 @@ impl SectionLaw {
         self.squares.total
     }
 
-    /// Directions that were used in all, over all rotations; zero for closed forms, sections that hit for Monte Carlo.
+    /// Total number of directions over all rotations; zero for closed forms, the number of sections that hit for Monte
+    /// Carlo.
     #[must_use]
     pub fn directions(&self) -> usize {
         self.directions
     }
 
-    /// Random rotations (or Monte Carlo batches) the standard error comes from; zero for closed forms.
+    /// Number of random rotations (or Monte Carlo batches) that the standard error comes from; zero for closed forms.
     #[must_use]
     pub fn rotations(&self) -> usize {
         self.samples.len()
@@ -399,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn ellipsoid_takes_its_two_longest_axes_for_the_largest_section() {
+    fn the_largest_section_of_an_ellipsoid_contains_its_two_longest_axes() {
         for axes in [
             [1.0, 2.0, 3.0],
             [3.0, 2.0, 1.0],

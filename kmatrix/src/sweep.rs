@@ -1,8 +1,10 @@
-//! All sections across one direction at once: a sweep over the sorted vertices of a closed mesh.
+//! All sections perpendicular to one direction: a sweep over the sorted vertices of a closed mesh.
 //!
-//! Between two vertices of a contour its area is a quadratic of the height. Near a vertex the section changes by a polygon as large as the
-//! distance from it, so area and slope are continuous there and only the curvature jumps, by a sum over the triangles around the vertex.
-//! A contour is therefore three numbers that every vertex on it moves on; only where contours split or merge are they walked around anew.
+//! Between two of its vertices the area of a contour is a quadratic function of the height. Near a vertex the section
+//! changes by a polygon whose diameter is proportional to the distance from the vertex, so area and slope are
+//! continuous there and only the curvature jumps, by a sum over the triangles around the vertex. A contour is therefore
+//! represented by three numbers, which are updated at each of its vertices. Contours are traversed again only where
+//! they split or merge.
 
 use crate::contour_area::ContourArea;
 use crate::contours::Contours;
@@ -11,13 +13,14 @@ use crate::plane::{HIGHEST, LOWEST, MIDDLE, Surface, View};
 use nalgebra::Vector3;
 use stereology_shape::SectionAreas;
 
-/// A sweep whose areas do not add up to the volume to this part was spoilt by an edge that is all but level: it is repeated a hair aside.
+/// Largest relative difference between the integral of the areas and the volume. A sweep with a larger one met an edge
+/// that is almost perpendicular to the direction; it is repeated in a slightly different direction.
 const MOST_DEFECT: f64 = 1e-7;
-/// How far aside, and how often, before the mesh itself must be at fault.
+/// Change of the direction, and number of attempts.
 const ASIDE: f64 = 1e-8;
 const ATTEMPTS: i32 = 4;
 
-/// One direction's view of a surface. Kept between directions.
+/// The sweep of a surface; reusable for several directions.
 pub(crate) struct Sweep<'a> {
     view: View<'a>,
     totals: SectionAreas,
@@ -43,7 +46,7 @@ impl<'a> Sweep<'a> {
             } else {
                 self.sweep_contours(&direction, measure)
             };
-            // Very thin bodies have volumes that rounding alone spoils: their sections count as they are.
+            // Rounding alone makes the volume of very thin bodies inaccurate: their sections are used as they are.
             if defect <= MOST_DEFECT || (attempt == ATTEMPTS && defect.is_finite()) {
                 break;
             }
@@ -100,14 +103,14 @@ impl<'a> Sweep<'a> {
                 cut = Some(corner / 4);
             }
         }
-        // Around the vertex the height passes its own as often as it is the middle of a triangle: 0 is an extremum, 2 a regular vertex,
-        // more a saddle.
+        // The number of triangles whose middle vertex this is: 0 at an extremum, 2 at a regular vertex, more at a
+        // saddle.
         let simple = !surface.pinched[vertex as usize];
         match (counts[MIDDLE as usize], cut) {
             (2, Some(cut)) if simple => {
                 let contour = contours.of(cut);
                 contours.bend(contour, height, jump, measure);
-                // Those it is the middle of, too: a contour remembers a triangle that is still cut.
+                // Triangles whose middle vertex this is are included: a contour keeps a triangle that is still cut.
                 for &corner in fan {
                     if self.view.role(corner) != HIGHEST {
                         contours.assign(corner / 4, contour);
@@ -136,7 +139,8 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Contours split or merge: those through the vertex end, and what leaves it is walked around anew.
+    /// Contours split or merge: those through the vertex end, and the contours above it are traversed to begin new
+    /// ones.
     fn retrace(&mut self, vertex: u32, contours: &mut Contours) {
         let fan = self.view.surface.around(vertex);
         for &corner in fan {

@@ -14,8 +14,8 @@ use stereology::kmatrix::Sizes;
 use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
 use stereology::shape::Body;
 use stereology::unfold::{
-    Bootstrap, BoundingBox, EdgeRule, Estimate, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel,
-    edge_weights, equal_edges, unfold,
+    Bootstrap, BoundingBox, EdgeRule, Estimate, ProfileCounts, SamplingWindow, SizeBins, UnfoldOptions, Unfolding,
+    capped_kernel, equal_edges, unfold,
 };
 use tiff::decoder::{Decoder, DecodingResult};
 
@@ -153,7 +153,9 @@ impl Labels {
             let mut pieces = self.pieces(axis, depth);
             pieces.retain(|piece| piece.size >= LEAST_SIZES[0]);
             let boxes: Vec<BoundingBox> = pieces.iter().map(|piece| piece.around).collect();
-            let weights = edge_weights(&boxes, width as f64, height as f64, EdgeRule::MilesLantuejoul);
+            let weights = SamplingWindow::continuous(width as f64, height as f64)
+                .weigh(&boxes, EdgeRule::MilesLantuejoul)
+                .weights;
             into.area += (width * height) as f64;
             into.slices.extend(vec![slice; pieces.len()]);
             into.categories.extend(vec![0; pieces.len()]);
@@ -351,7 +353,8 @@ fn by_law(profiles: &MeasuredProfiles, law: &GrainLaw, options: UnfoldOptions) -
     let edges = equal_edges(largest, DensityOptions::default().bins);
     let threshold = options.min_size.unwrap_or(0.0);
     let spheres = ParticleTypes::parse(&["sphere"])?;
-    let bins = spheres.unfolding_bins(&edges, threshold, options.method, Sizes::Integrated);
+    let smallest = profiles.sizes.iter().copied().fold(largest, f64::min);
+    let bins = spheres.unfolding_bins(&edges, smallest, threshold, options.method, Sizes::Integrated);
     let up_to = |x: f64| law.relative.partition_point(|of| *of <= x) as f64 / law.relative.len() as f64;
     let sizes = SizeBins::integrated(&bins.size_edges)?.reported_in(&edges)?;
     let kernel = capped_kernel(&up_to, law.caliper, 0.0, &bins.profile_edges, sizes, law.unit_volume)?;

@@ -1,9 +1,10 @@
 //! Bias and coverage of `unfold` for size distributions of known truth: spheres, sections simulated exactly.
 //!
-//! `cargo run --release -p stereology-unfold --example size_laws -- [REPEATS [PROFILES,... [LAW,...]]]`
+//! `cargo run --release -p stereology-unfold --example size_laws -- [REPEATS [PROFILES,... [LAW,...|all [METHOD
+//! [REPLICATES]]]]]`
 //!
-//! One row per distribution and number of profiles: bias, standard deviation and coverage (nominal 90 %) of the total, the mean size and the volume fraction,
-//! coverage of the bins on average, and milliseconds per fit.
+//! One row per distribution and number of profiles: bias, standard deviation and coverage (nominal 90 %) of the total,
+//! the mean size and the volume fraction, coverage of the bins on average, and milliseconds per fit.
 #![allow(
     clippy::print_stdout,
     clippy::cast_possible_truncation,
@@ -18,11 +19,11 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::time::Instant;
 use stereology_unfold::{
-    Bootstrap, Estimate, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel, divided_edges, equal_edges,
-    unfold,
+    Bootstrap, Estimate, Method, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel, equal_edges,
+    fitting_edges, fitting_profile_edges, unfold,
 };
 
-const LAWS: [&str; 12] = [
+const LAWS: [&str; 16] = [
     "lognormal.3",
     "lognormal.5",
     "lognormal.8",
@@ -35,6 +36,10 @@ const LAWS: [&str; 12] = [
     "spike+tail",
     "monodisperse",
     "fines",
+    "constant",
+    "single",
+    "bimodal",
+    "band+mode",
 ];
 
 /// One size of a distribution.
@@ -76,7 +81,22 @@ fn size(law: &str, rng: &mut ChaCha8Rng) -> f64 {
                 (0.2 * normal).exp()
             }
         }
+        // Those of figure 7, and a narrow band on a broad mode.
+        "constant" => uniform,
+        "single" => within(0.55 + 0.15 * normal, rng, law),
+        "bimodal" => within(if uniform < 0.5 { 0.3 } else { 0.75 } + 0.08 * normal, rng, law),
+        "band+mode" if uniform < 0.3 => 0.7 + 0.05 * rng.random::<f64>(),
+        "band+mode" => within(0.5 + 0.15 * normal, rng, law),
         _ => 0.5,
+    }
+}
+
+/// The size if it lies in (0, 1], else another one.
+fn within(drawn: f64, rng: &mut ChaCha8Rng, law: &str) -> f64 {
+    if drawn > 0.0 && drawn <= 1.0 {
+        drawn
+    } else {
+        size(law, rng)
     }
 }
 
@@ -88,6 +108,7 @@ struct Law {
     /// Sizes, and their running sum.
     drawn: Vec<f64>,
     running: Vec<f64>,
+    sorted: Vec<f64>,
 }
 
 impl Law {
@@ -103,16 +124,19 @@ impl Law {
             })
             .collect();
         let count = drawn.len() as f64;
+        let mut sorted = drawn.clone();
+        sorted.sort_by(f64::total_cmp);
         Self {
             name,
             mean: sum / count,
             cube: drawn.iter().map(|d| d.powi(3)).sum::<f64>() / count,
+            sorted,
             drawn,
             running,
         }
     }
 
-    /// Poisson many profiles of one sphere per unit volume, and the area they lie on.
+    /// A Poisson number of profiles of one sphere per unit volume, and the area they lie on.
     fn profiles(&self, expected: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, f64) {
         let count = Poisson::new(expected).map_or(0.0, |law| law.sample(rng)) as usize;
         let whole = self.running[self.running.len() - 1];
@@ -127,22 +151,23 @@ impl Law {
 
     /// Fraction of the particles in a bin.
     fn fraction(&self, from: f64, to: f64) -> f64 {
-        // A part of the table is enough for bins.
-        let part = &self.drawn[..200_000];
-        part.iter().filter(|d| **d > from && **d <= to).count() as f64 / part.len() as f64
+        let below = |size: f64| self.sorted.partition_point(|&of| of <= size) as f64;
+        (below(to) - below(from)) / self.sorted.len() as f64
     }
 }
 
-fn fit(profiles: &[f64], area: f64, seed: u64) -> Result<Unfolding, Box<dyn Error>> {
+fn fit(profiles: &[f64], area: f64, seed: u64, method: Method, replicates: usize) -> Result<Unfolding, Box<dyn Error>> {
     let largest = profiles.iter().copied().fold(0.0, f64::max);
     let edges = equal_edges(largest, 10);
-    let bins = SizeBins::integrated(&divided_edges(&edges, 40, 0.0))?.reported_in(&edges)?;
-    let profile_edges = divided_edges(&edges, 100, 0.0);
+    let smallest = profiles.iter().copied().fold(largest, f64::min);
+    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0))?.reported_in(&edges)?;
+    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0);
     let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
     let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?;
     let counts = ProfileCounts::from_sizes(profiles, None, &profile_edges, area)?;
-    let options = UnfoldOptions::default().with_bootstrap(Bootstrap {
+    let options = UnfoldOptions::default().with_method(method).with_bootstrap(Bootstrap {
         seed,
+        replicates,
         ..Bootstrap::default()
     });
     Ok(unfold(&counts, &spheres, &options)?)
@@ -180,8 +205,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let repeats: u64 = arguments.next().map_or(Ok(40), |text| text.parse())?;
     let profiles = arguments.next().unwrap_or_else(|| "50,200,1000,5000".to_owned());
-    let wanted = arguments.next();
-    println!("law           profiles |   total          |   mean size      |   volume frac.   | bins  methods   ms");
+    let wanted = arguments.next().filter(|laws| laws != "all");
+    let method = match arguments.next().as_deref() {
+        None | Some("auto") => Method::Auto,
+        Some("em") => Method::Em,
+        Some("penalised") => Method::Penalised,
+        Some(other) => return Err(format!("no method {other}").into()),
+    };
+    let replicates = arguments.next().map_or(Ok(200), |text| text.parse())?;
+    println!(
+        "law           profiles |   total          |   mean size      |   volume frac.   |  A_A   | bins    L1  sparse   ms"
+    );
     for name in LAWS {
         if wanted
             .as_ref()
@@ -194,17 +228,23 @@ fn main() -> Result<(), Box<dyn Error>> {
             let expected: f64 = expected.parse()?;
             let (mut total, mut mean, mut volume) = (Tally::default(), Tally::default(), Tally::default());
             let (mut bins_held, mut bins, mut sparse, mut seconds) = (0_u32, 0_u32, 0_usize, 0.0);
+            let (mut distance, mut area_fraction) = (0.0, 0.0);
             for repeat in 0..repeats {
                 let mut rng = ChaCha8Rng::seed_from_u64(11 + 1000 * repeat);
                 rng.set_stream(expected as u64);
                 let (sizes, area) = law.profiles(expected, &mut rng);
                 let start = Instant::now();
-                let found = fit(&sizes, area, repeat)?;
+                let found = fit(&sizes, area, repeat, method, replicates)?;
                 seconds += start.elapsed().as_secs_f64();
                 total.add(found.total, 1.0);
                 mean.add(found.mean_size, law.mean);
                 volume.add(found.volume_fraction, PI / 6.0 * law.cube);
+                area_fraction += found.area_fraction.observed / (PI / 6.0 * law.cube) - 1.0;
                 sparse += usize::from(found.method.name() == "sparse");
+                for (bin, density) in found.edges.windows(2).zip(&found.number_density) {
+                    let truth = law.fraction(bin[0], bin[1]);
+                    distance += (density.unwrap_or(0.0) / found.total.value - truth).abs();
+                }
                 for (bin, interval) in found.edges.windows(2).zip(found.intervals.iter().flatten()) {
                     let truth = law.fraction(bin[0], bin[1]);
                     if let Some(of) = interval
@@ -216,13 +256,15 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
             println!(
-                "{:13} {:8} | {} | {} | {} | {:.2}  {sparse:3}/{repeats:3}  {:.1}",
+                "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.3} {sparse:3}/{repeats:3}  {:.1}",
                 law.name,
                 expected,
                 total.show(),
                 mean.show(),
                 volume.show(),
+                100.0 * area_fraction / repeats as f64,
                 f64::from(bins_held) / f64::from(bins.max(1)),
+                distance / repeats as f64,
                 1e3 * seconds / repeats as f64
             );
         }

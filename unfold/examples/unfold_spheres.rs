@@ -1,4 +1,5 @@
-//! From profile diameters to spheres per volume, by the default and by the paper's method: `cargo run -p stereology-unfold --example unfold_spheres`
+//! From profile diameters to spheres per volume, by the default and by the paper's method: `cargo run -p
+//! stereology-unfold --example unfold_spheres`
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 
 use rand::{RngExt, SeedableRng};

@@ -1,4 +1,5 @@
-//! Counts drawn again from a fit, or slices drawn again from those there are, fitted again side by side, each from its own stream of random numbers.
+//! Counts drawn again from a fit, or slices drawn again from those there are, fitted again side by side, each from its
+//! own stream of random numbers.
 
 use crate::estimate::Interval;
 use crate::options::{Bootstrap, Resampling};
@@ -11,13 +12,16 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_metrics::Progress;
 
-/// Densities of every replicate, in order, and of the fit they are replicates of.
+/// Densities of every replicate, in order, and of the fit each is a replicate of.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Replicates {
-    pub(crate) base: Vec<f64>,
+    /// Densities of the fits that counts were drawn from.
+    pub(crate) bases: Vec<Vec<f64>>,
+    /// Index of the base of each replicate.
+    pub(crate) base_of: Vec<usize>,
     pub(crate) densities: Vec<Vec<f64>>,
     pub(crate) bootstrap: Bootstrap,
-    /// Slices that were drawn, if slices were.
+    /// Number of slices, if slices were resampled.
     pub(crate) slices: Option<usize>,
 }
 
@@ -36,11 +40,14 @@ impl Replicates {
     /// # Formula
     ///
     /// ```text
-    /// g − b ± z σ      g: of the rough fit; b, σ: mean of the replicates less g, and their standard deviation; z: normal quantile
+    /// m ± z σ      m, σ: mean and standard deviation over the replicates r of g_r − (q_r − g_r)
     /// ```
     ///
-    /// For slices σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. Widened to hold `value`, the estimate reported; from zero to
-    /// `most` at most.
+    /// with q_r the quantity of replicate r, g_r that of the fit it was drawn from, and z the normal quantile. The fits
+    /// differ where the counts allow several grids, so σ contains that uncertainty too.
+    ///
+    /// For slices σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. The interval is
+    /// widened to contain `value`, the reported estimate, and lies between zero and `most`.
     pub(crate) fn interval(
         &self,
         value: f64,
@@ -48,12 +55,19 @@ impl Replicates {
         deviation: Deviation,
         quantity: &dyn Fn(&[f64]) -> f64,
     ) -> Interval {
-        let values: Vec<f64> = self.densities.iter().map(|densities| quantity(densities)).collect();
-        let base = quantity(&self.base);
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        let bias = mean - base;
+        let bases: Vec<f64> = self.bases.iter().map(|base| quantity(base)).collect();
+        let n = self.densities.len() as f64;
+        let replicates = self.densities.iter().zip(&self.base_of);
+        let values: Vec<(f64, f64)> = replicates
+            .map(|(densities, &base)| (bases[base], quantity(densities) - bases[base]))
+            .collect();
+        let bias = values.iter().map(|(_, error)| error).sum::<f64>() / n;
+        let centre = values.iter().map(|(base, error)| base - error).sum::<f64>() / n;
+        let variance = values
+            .iter()
+            .map(|(base, error)| (base - error - centre).powi(2))
+            .sum::<f64>()
+            / (n - 1.0);
         let inflation = self.slices.map_or(1.0, |slices| slices as f64 / (slices as f64 - 1.0));
         let squared = variance * inflation
             + if deviation == Deviation::SpreadAndBias {
@@ -68,8 +82,8 @@ impl Replicates {
         };
         let reach = quantile * squared.sqrt();
         Interval {
-            lower: (base - bias - reach).max(0.0).min(value),
-            upper: (base - bias + reach).min(most).max(value),
+            lower: (centre - reach).max(0.0).min(value),
+            upper: (centre + reach).min(most).max(value),
         }
     }
 }
@@ -98,15 +112,16 @@ impl Source<'_> {
     }
 }
 
-/// Draws counts and fits them, `bootstrap.replicates` times; `fit` is given room of its own.
-pub(crate) fn replicate<R>(
+/// Draws counts and fits them, `bootstrap.replicates` times. `source` and `fit` receive the number of the replicate;
+/// `fit` also receives working memory.
+pub(crate) fn replicate<'a, R>(
     bootstrap: &Bootstrap,
     stream: u64,
-    source: &Source<'_>,
+    source: impl Fn(usize) -> Source<'a> + Sync,
     bins: usize,
     progress: Progress<'_>,
     room: impl Fn() -> R + Sync + Send,
-    fit: impl Fn(&[f64], &mut R) -> Result<Vec<f64>, UnfoldError> + Sync,
+    fit: impl Fn(usize, &[f64], &mut R) -> Result<Vec<f64>, UnfoldError> + Sync,
 ) -> Result<Vec<Vec<f64>>, UnfoldError> {
     let done = AtomicUsize::new(0);
     (0..bootstrap.replicates)
@@ -114,10 +129,10 @@ pub(crate) fn replicate<R>(
         .map_init(room, |room, task| {
             let mut rng = ChaCha8Rng::seed_from_u64(bootstrap.seed);
             rng.set_stream(stream + task as u64);
-            let drawn = source.draw(&mut rng);
-            // A draw without a single profile unfolds to nothing.
+            let drawn = source(task).draw(&mut rng);
+            // A resample with no profiles has zero density in every bin.
             let densities = if drawn.iter().sum::<f64>() > 0.0 {
-                fit(&drawn, room)?
+                fit(task, &drawn, room)?
             } else {
                 vec![0.0; bins]
             };

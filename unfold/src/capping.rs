@@ -1,7 +1,8 @@
 //! Missing fines that are lost at the rim of particles: the capping angle of Keiding & Jensen (1972).
 //!
-//! A plane that cuts off no more than a small cap shows a profile too faint or too thin to be seen. With a capping angle φ a particle of size D shows no profile
-//! below D sin φ, whatever D; a size threshold loses the same profiles of all particles. The kernel is that of the law of relative sizes F, cut at sin φ:
+//! A plane that cuts off no more than a small cap shows a profile too faint or too thin to be seen. With a capping
+//! angle φ a particle of size D shows no profile below D sin φ, whatever D; a size threshold loses the same profiles of
+//! all particles. The kernel is that of the law of relative sizes F, cut at sin φ:
 //!
 //! ```text
 //! K_ij = H D [F(max(x_i, s)) − F(max(x_(i−1), s))],   x = d / D,  s = sin φ
@@ -12,9 +13,10 @@ use nalgebra::DMatrix;
 
 /// The kernel of a body from its law of relative profile sizes, seen under a capping angle (0: everything is seen).
 ///
-/// `law` is F, the share of the profiles of a particle of size 1 that are no larger than x, rising from 0 to 1 on [0, 1]; `caliper` the expected number of its
-/// profiles per unit area of plane when there is one particle per unit volume: for a convex body its mean caliper diameter. `capping_angle` is in radians,
-/// from 0 to below π/2. Takes 24 evaluations of F an entry for sizes spread over their bins.
+/// `law` is F, the share of the profiles of a particle of size 1 that are no larger than x, rising from 0 to 1 on [0,
+/// 1]; `caliper` the expected number of its profiles per unit area of plane when there is one particle per unit volume:
+/// for a convex body its mean caliper diameter. `capping_angle` is in radians, from 0 to below π/2. Takes 24
+/// evaluations of F an entry for sizes spread over their bins.
 ///
 /// # Errors
 ///

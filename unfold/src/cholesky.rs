@@ -3,7 +3,8 @@
 /// Rows of a factor that are finished together.
 const PANEL: usize = 4;
 
-/// A symmetric matrix of which one triangle is used; then its factor U, with UᵀU the matrix, in the same place, row by row.
+/// A symmetric matrix of which one triangle is used; then its factor U, with UᵀU the matrix, in the same place, row by
+/// row.
 #[derive(Clone, Debug)]
 pub(crate) struct Symmetric {
     size: usize,
@@ -29,7 +30,8 @@ impl Symmetric {
 
     /// Replaces the matrix by U with Uᵀ U the matrix; `false` if it is not positive definite.
     ///
-    /// Four rows are finished at a time and taken off those below together: rows are short, so what counts is how often each is read.
+    /// Four rows are finished at a time and taken off those below together: rows are short, so what counts is how often
+    /// each is read.
     pub(crate) fn factorise(&mut self) -> bool {
         let n = self.size;
         let mut first = 0;
@@ -90,7 +92,8 @@ impl Symmetric {
     }
 }
 
-/// Σ a b, in four sums side by side so that a processor can take four terms at once; the same order, so the same bits, always.
+/// Σ a b, in four sums side by side so that a processor can take four terms at once; the same order, so the same bits,
+/// always.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a_fours, b_fours) = (a.chunks_exact(4), b.chunks_exact(4));

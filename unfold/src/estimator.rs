@@ -3,11 +3,11 @@
 use crate::expectation_maximisation::maximise;
 use crate::log_densities::{Effort, Penalty, Start, Workspace, climb};
 use crate::options::{Method, UnfoldOptions};
-use crate::penalised::smooth;
+use crate::penalised::{SmoothFit, smooth};
 use crate::problem::Problem;
 use crate::unfold_error::UnfoldError;
 use crate::{inverse, nnls, sparse};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Densities of the kept bins of the kernel, and how they came about.
 #[derive(Clone, Debug)]
@@ -19,30 +19,31 @@ pub(crate) struct Fit {
     pub(crate) negative: Vec<(usize, f64)>,
     pub(crate) iterations: usize,
     pub(crate) converged: bool,
-    /// The best penalty.
-    pub(crate) penalty: Option<Penalty>,
+    /// The best penalty, and the size about which it is lighter.
+    pub(crate) penalty: Option<(Penalty, Option<f64>)>,
     /// Parameters in effect.
     pub(crate) parameters: f64,
     /// ln evidence of the sparse estimate less that of the smooth one, where both were asked.
     pub(crate) for_sparse: Option<f64>,
     /// ln evidence, where there is one; differences count.
     pub(crate) evidence: Option<f64>,
-    /// What is fitted to counts drawn again.
-    pub(crate) again: Refit,
+    /// What is fitted to resampled counts, with weights.
+    pub(crate) again: Vec<(f64, Refit)>,
 }
 
 /// The estimator of the bootstrap: rougher than a smooth estimate, so that its own bias is small beside its spread.
 #[derive(Clone, Debug)]
 pub(crate) enum Refit {
-    /// Penalised at this weight, from this start.
-    Smooth(Penalty, Vec<f64>),
+    /// Penalised with this weight on the grid of this index, from this start.
+    Smooth(usize, Penalty, Vec<f64>),
     /// Largest likelihood on all reported bins.
     Likelihood,
     /// The estimator itself.
     Same(Method),
 }
 
-/// `auto` takes the sparse estimate if its evidence is e³ = 20 times that of the smooth one: strong, in the words of Kass & Raftery (1995).
+/// `auto` takes the sparse estimate if its evidence is e³ = 20 times that of the smooth one: strong, in the words of
+/// Kass & Raftery (1995).
 const STRONG: f64 = 3.0;
 /// The weight of the penalty in the bootstrap is the best one over this.
 const ROUGHER: f64 = 10.0;
@@ -75,44 +76,82 @@ pub(crate) fn again(
     room: &mut Workspace,
 ) -> Result<Vec<f64>, UnfoldError> {
     match refit {
-        Refit::Smooth(penalty, start) => {
+        Refit::Smooth(grid, penalty, start) => {
+            let grid = &problem.grids[*grid];
             let roughness = penalty.on(start.len());
-            let start = Start::at(&problem.design, counts, start, room);
-            let peak = climb(&problem.design, counts, &roughness, &start, Effort::BRIEF, room);
-            Ok(problem.with_logarithms(&peak.theta))
+            let start = Start::at(&grid.design, counts, start, room);
+            let peak = climb(&grid.design, counts, &roughness, &start, Effort::BRIEF, room);
+            Ok(grid.with_logarithms(&peak.theta))
         }
         Refit::Likelihood => Ok(problem.spread(&sparse::on_all(&problem.coarse, counts))),
         Refit::Same(method) => Ok(plain_fit(problem, counts, *method, options)?.densities),
     }
 }
 
-/// The fit and its evidence.
+/// The smooth estimates on all grids, averaged by their evidence, and the evidence of all.
 fn smooth_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
-    let found = smooth(&problem.design, counts);
-    let (penalty, theta) = found.second_order;
-    let rougher = Penalty {
-        weight: penalty.weight / ROUGHER,
-        ..penalty
-    };
-    let densities = found
-        .densities
-        .iter()
-        .zip(&problem.widths)
-        .map(|(n, w)| n * w)
+    let found: Vec<SmoothFit> = problem.grids.iter().map(|grid| smooth(&grid.design, counts)).collect();
+    let (best, evidence) = averaged(&found);
+    let mut densities = vec![0.0; problem.columns.len()];
+    let weights: Vec<f64> = (0..found.len())
+        .map(|k| (log_weight(&found, k) - log_weight(&found, best)).exp())
         .collect();
+    let whole: f64 = weights.iter().sum();
+    for ((grid, of), weight) in problem.grids.iter().zip(&found).zip(&weights) {
+        let of = grid.densities(&of.densities);
+        densities
+            .iter_mut()
+            .zip(of)
+            .for_each(|(sum, n)| *sum += weight / whole * n);
+    }
+    let refits = found.iter().zip(&weights).enumerate().map(|(grid, (of, weight))| {
+        let (penalty, theta) = of.second_order.clone();
+        let rougher = Penalty {
+            weight: penalty.weight / ROUGHER,
+            ..penalty
+        };
+        (*weight, Refit::Smooth(grid, rougher, theta))
+    });
+    let again = refits.collect();
+    let bend = found[best]
+        .penalty
+        .bend
+        .map(|fraction| problem.grids[best].size_at(fraction));
     let fit = Fit {
         densities,
         method: Method::Penalised,
         negative: Vec::new(),
-        iterations: found.iterations,
+        iterations: found.iter().map(|of| of.iterations).sum(),
         converged: true,
-        penalty: Some(found.penalty),
-        parameters: found.effective_parameters,
+        penalty: Some((found[best].penalty, bend)),
+        parameters: found[best].effective_parameters,
         for_sparse: None,
-        evidence: Some(found.evidence),
-        again: Refit::Smooth(rougher, theta),
+        evidence: Some(evidence),
+        again,
     };
-    (fit, found.evidence)
+    (fit, evidence)
+}
+
+/// Prior weight of the logarithmic grid, the last of three, over that of each other grid. The evidence of a few hundred
+/// profiles hardly distinguishes grids, and densities that are smooth on a linear grid do not decrease towards size
+/// zero as those of materials do.
+const LOGARITHMIC: f64 = 4.0;
+
+/// ln of the weight of a grid among the fits on all grids.
+fn log_weight(found: &[SmoothFit], grid: usize) -> f64 {
+    let is_logarithmic = found.len() > 1 && grid == found.len() - 1;
+    found[grid].evidence + if is_logarithmic { LOGARITHMIC.ln() } else { 0.0 }
+}
+
+/// Index of the fit of largest weight, and ln of the mean evidence.
+fn averaged(found: &[SmoothFit]) -> (usize, f64) {
+    let best = (0..found.len())
+        .max_by(|&a, &b| log_weight(found, a).total_cmp(&log_weight(found, b)))
+        .unwrap_or(0);
+    let top = log_weight(found, best);
+    let sum: f64 = (0..found.len()).map(|k| (log_weight(found, k) - top).exp()).sum();
+    let prior = found.len() as f64 - 1.0 + if found.len() > 1 { LOGARITHMIC } else { 1.0 };
+    (best, top + (sum / prior).ln())
 }
 
 /// The fit and its evidence.
@@ -128,7 +167,7 @@ fn sparse_fit(problem: &Problem, counts: &[f64]) -> (Fit, f64) {
         parameters: found.kept as f64,
         for_sparse: None,
         evidence: Some(found.evidence),
-        again: Refit::Likelihood,
+        again: vec![(1.0, Refit::Likelihood)],
     };
     (fit, found.evidence)
 }
@@ -152,6 +191,7 @@ fn plain_fit(problem: &Problem, counts: &[f64], method: Method, options: &Unfold
             (iterations, converged) = (found.iterations, found.converged);
             found.solution.iter().copied().collect()
         }
+        Method::Em if problem.grids.len() > 1 => return Ok(em_on_pairs(problem, counts, options)),
         _ => {
             let smoothing = if method == Method::Ems { options.smoothing } else { 0.0 };
             let found = maximise(matrix, counts, smoothing, options.tolerance, options.max_iterations);
@@ -169,16 +209,47 @@ fn plain_fit(problem: &Problem, counts: &[f64], method: Method, options: &Unfold
         parameters: columns as f64,
         for_sparse: None,
         evidence: None,
-        again: Refit::Same(method),
+        again: vec![(1.0, Refit::Same(method))],
     })
+}
+
+/// Expectation-maximisation on pairs of nodes of the logarithmic grid: reported bins in which a wide distribution is
+/// not uniform leave a bias that no number of profiles removes.
+fn em_on_pairs(problem: &Problem, counts: &[f64], options: &UnfoldOptions) -> Fit {
+    let grid = &problem.grids[problem.grids.len() - 1];
+    let single = grid.matrix(&problem.fine);
+    let pairs = single.ncols() / 2;
+    let matrix = DMatrix::from_fn(single.nrows(), pairs, |i, k| {
+        single[(i, 2 * k)] + single[(i, 2 * k + 1)]
+    });
+    let found = maximise(&matrix, counts, 0.0, options.tolerance, options.max_iterations);
+    let nodes: Vec<f64> = found.densities.iter().flat_map(|density| [*density; 2]).collect();
+    Fit {
+        densities: grid.densities(&nodes),
+        method: Method::Em,
+        negative: Vec::new(),
+        iterations: found.iterations,
+        converged: found.converged,
+        penalty: None,
+        parameters: pairs as f64,
+        for_sparse: None,
+        evidence: None,
+        again: vec![(1.0, Refit::Same(Method::Em))],
+    }
 }
 
 /// Room for [`again`].
 pub(crate) fn workspace(problem: &Problem) -> Workspace {
-    Workspace::new(&problem.design)
+    // Several grids have the same number of nodes.
+    Workspace::new(&problem.grids[0].design)
 }
 
 /// ln evidence of the smooth estimate: how well sizes and kernel suit the counts, whatever the densities.
 pub(crate) fn evidence(problem: &Problem) -> f64 {
-    smooth(&problem.design, &problem.counts).evidence
+    let found: Vec<SmoothFit> = problem
+        .grids
+        .iter()
+        .map(|grid| smooth(&grid.design, &problem.counts))
+        .collect();
+    averaged(&found).1
 }

@@ -1,5 +1,5 @@
-//! Maximum of the Poisson likelihood of profile counts by expectation-maximisation (Richardson 1972, Lucy 1974), and with smoothing after every step
-//! (EMS: Silverman, Jones, Wilson & Nychka 1990).
+//! Maximum of the Poisson likelihood of profile counts by expectation-maximisation (Richardson 1972, Lucy 1974), and
+//! with smoothing after every step (EMS: Silverman, Jones, Wilson & Nychka 1990).
 
 use nalgebra::DMatrix;
 
@@ -19,11 +19,12 @@ pub(crate) struct Maximum {
 /// x_j ← x_j g_j,   g_j = Σ_i K_ij n_i / μ_i / Σ_i K_ij
 /// ```
 ///
-/// Every step raises the likelihood and keeps Σ μ = Σ n. By concavity the maximum is at most Σ n · (max g − 1) above the present value, which
-/// gives the exit: that bound within `tolerance`, in units of log-likelihood.
+/// Every step raises the likelihood and keeps Σ μ = Σ n. By concavity the maximum is at most Σ n · (max g − 1) above
+/// the present value, which gives the exit: that bound within `tolerance`, in units of log-likelihood.
 ///
-/// With `smoothing` s above zero a step ends with x_j ← (1 − 2 s) x_j + s (x_(j−1) + x_(j+1)), the ends keeping what would leave. That has no likelihood
-/// to climb: it ends where a step moves expected counts by less than `tolerance` all together.
+/// With `smoothing` s above zero a step ends with x_j ← (1 − 2 s) x_j + s (x_(j−1) + x_(j+1)), the ends keeping what
+/// would leave. That has no likelihood to climb: it ends where a step moves expected counts by less than `tolerance`
+/// all together.
 ///
 /// Columns of `kernel` must have positive sums, and rows with counts a positive entry.
 pub(crate) fn maximise(

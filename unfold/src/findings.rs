@@ -12,8 +12,8 @@ const NEGATIVE: &str = "negative-bins";
 /// Densities of neighbouring bins swing up and down.
 const OSCILLATING: &str = "oscillating-bins";
 
-/// A finding that names the number of equal bins that cures it: the largest below `bins` for which `unfold_again`, which unfolds the same profiles in that many
-/// bins, does not return the same code.
+/// A finding that names the number of equal bins that cures it: the largest below `bins` for which `unfold_again`,
+/// which unfolds the same profiles in that many bins, does not return the same code.
 ///
 /// Only `negative-bins` and `oscillating-bins` are cured by fewer bins; other findings are returned unchanged.
 ///
@@ -50,7 +50,8 @@ fn numbered(bins: &[usize]) -> String {
         .join(", ")
 }
 
-/// All findings on a fit. Codes: `negative-bins`, `few-profiles-in-bin`, `oscillating-bins`, `threshold-moved`, `not-converged`.
+/// All findings on a fit. Codes: `negative-bins`, `few-profiles-in-bin`, `oscillating-bins`, `threshold-moved`,
+/// `not-converged`.
 pub(crate) fn findings(
     problem: &Problem,
     counts: &ProfileCounts,

@@ -5,8 +5,9 @@ use nalgebra::DMatrix;
 
 /// An absolute kernel with the sizes of its columns.
 ///
-/// Entry (i, j): expected profiles per unit area in profile bin i of one particle per unit volume in size bin j; a length. The paper's
-/// `H K` (eqs. 2, 5) with the mean caliper of the largest particle, or any kernel of another source.
+/// Entry (i, j): expected profiles per unit area in profile bin i of one particle per unit volume in size bin j; a
+/// length. The paper's `H K` (eqs. 2, 5) with the mean caliper of the largest particle, or any kernel of another
+/// source.
 ///
 /// # Examples
 ///
@@ -83,12 +84,13 @@ pub enum KernelError {
 }
 
 impl Kernel {
-    /// A kernel from a matrix (rows: profile bins, columns: size bins), the sizes of its columns and the volume of the body at size 1
-    /// (a sphere's: π / 6).
+    /// A kernel from a matrix (rows: profile bins, columns: size bins), the sizes of its columns and the volume of the
+    /// body at size 1 (a sphere's: π / 6).
     ///
     /// # Errors
     ///
-    /// [`KernelError`] if the shape does not fit the bins, an entry is negative or not finite, or the volume is not positive.
+    /// [`KernelError`] if the shape does not fit the bins, an entry is negative or not finite, or the volume is not
+    /// positive.
     pub fn new(matrix: DMatrix<f64>, sizes: SizeBins, unit_volume: f64) -> Result<Self, KernelError> {
         if matrix.nrows() == 0 || matrix.ncols() != sizes.len() {
             return Err(KernelError::Shape {
@@ -139,7 +141,8 @@ impl Kernel {
         Ok(self)
     }
 
-    /// The kernel of several types that share one size distribution, with given fractions of the particles: eqs. (10)-(12).
+    /// The kernel of several types that share one size distribution, with given fractions of the particles: eqs.
+    /// (10)-(12).
     ///
     /// Fractions are scaled to sum to 1; the volume at size 1 is their mean.
     ///
@@ -192,18 +195,21 @@ impl Kernel {
         self.unit_surface
     }
 
-    /// Ratio of the largest to the smallest singular value of the matrix: how much noise may grow; infinite if it is singular.
+    /// Ratio of the largest to the smallest singular value of the matrix: how much noise may grow; infinite if it is
+    /// singular.
     #[must_use]
     pub fn condition_number(&self) -> f64 {
         condition_number(&self.matrix)
     }
 }
 
-/// Σ P(i) H_i K_i: the kernel of several types with a shared size distribution, eqs. (10)-(12). Fractions are scaled to sum to 1.
+/// Σ P(i) H_i K_i: the kernel of several types with a shared size distribution, eqs. (10)-(12). Fractions are scaled to
+/// sum to 1.
 ///
 /// # Errors
 ///
-/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one a kernel, finite, not negative and not all zero.
+/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one a kernel, finite, not negative and not
+/// all zero.
 ///
 /// ```
 /// use nalgebra::dmatrix;

@@ -19,14 +19,16 @@ const SPACINGS: usize = 20;
 ///
 /// # Formula
 ///
-/// Near the largest size D the share of profiles above D − ε grows as ε^α, with α = 1/2 if many particles are of that size and 3/2 if sizes run out evenly
-/// below it. Then with d₁ ≥ d₂ ≥ … the expected gap of d₁ is α times that between d₁ and d₂, and that to d_(k+1) is c_k times it,
+/// Near the largest size D the share of profiles above D − ε grows as ε^α, with α = 1/2 if many particles are of that
+/// size and 3/2 if sizes run out evenly below it. Then with d₁ ≥ d₂ ≥ … the expected gap of d₁ is α times that between
+/// d₁ and d₂, and that to d_(k+1) is c_k times it,
 ///
 /// ```text
 /// D ≈ d₁ + (d₁ − d_(k+1)) / (c_k − 1),   c_k = Γ(k + 1 + β) / (Γ(k + 1) Γ(1 + β)),   β = 1 / α
 /// ```
 ///
-/// with k = 20 spacings, or a tenth of the profiles if they are fewer. α = 1 is taken (Robson & Whitlock 1964 for k = 1), in the middle of what can be.
+/// with k = 20 spacings, or a tenth of the profiles if they are fewer. α = 1 is taken (Robson & Whitlock 1964 for k =
+/// 1), in the middle of what can be.
 ///
 /// `None` without two different sizes that are finite and above zero. Takes a sort.
 ///

@@ -1,16 +1,18 @@
 //! Unfolding: from profiles per area to particles per volume.
 //!
-//! A random plane cuts large particles more often than small ones and shows each at any size up to its largest. With profiles counted by size
-//! (N_A, per unit area) and a kernel K that says how often a particle of each size shows as a profile of each size,
+//! A random plane cuts large particles more often than small ones and shows each at any size up to its largest. With
+//! profiles counted by size (N_A, per unit area) and a kernel K that says how often a particle of each size shows as a
+//! profile of each size,
 //!
 //! ```text
 //! N_A = K N_V          K absolute, a length: the paper's H K
 //! ```
 //!
-//! is solved for the particles N_V per unit volume. Kernels are taken as given: from `stereology-kmatrix`, or made by hand as below. Results are
-//! absolute, never only a normalised histogram, and carry what is needed to judge them: refolded counts, deviance, condition number, clamped
-//! bins, bias-corrected intervals, cross-checks, and [`Finding`]s for the symptoms the paper names. What is not known is sought in the counts too: the
-//! largest size, a capping angle ([`likely_parameter`]), shares of types ([`unknown_fractions`]); where they do not tell, that is the answer.
+//! is solved for the particles N_V per unit volume. Kernels are taken as given: from `stereology-kmatrix`, or made by
+//! hand as below. Results are absolute, never only a normalised histogram, and carry what is needed to judge them:
+//! refolded counts, deviance, condition number, clamped bins, bias-corrected intervals, cross-checks, and [`Finding`]s
+//! for the symptoms the paper names. What is not known is sought in the counts too: the largest size, a capping angle
+//! ([`likely_parameter`]), shares of types ([`unknown_fractions`]); where they do not tell, that is the answer.
 //!
 //! # Spheres, by hand
 //!
@@ -67,17 +69,17 @@
 //! | [`Method::Nnls`] | non-negative least squares | for comparison with other programs |
 //! | [`Method::Paper`] | K⁻¹, negative densities set to zero | to repeat the paper; noise grows with the condition number (spheres 14, slender spheroids 1500) |
 //!
-//! Left-closed bins and histograms scaled to 1 were rejected: both are wrong by construction (the first by up to 1.6 %, the second by whatever the
-//! total is wrong).
+//! Left-closed bins and histograms scaled to 1 were rejected: both are wrong by construction (the first by up to 1.6 %,
+//! the second by whatever the total is wrong).
 
 mod bootstrap;
 mod capping;
 mod cholesky;
-mod edge_rule;
 mod estimate;
 mod estimator;
 mod expectation_maximisation;
 mod findings;
+mod grid;
 mod inverse;
 mod kernel;
 mod largest_size;
@@ -98,9 +100,9 @@ mod unfolding;
 mod unknown_fractions;
 
 pub use capping::capped_kernel;
-pub use edge_rule::{BoundingBox, EdgeRule, edge_weights};
 pub use estimate::{CrossCheck, Estimate, Interval};
 pub use findings::with_cure;
+pub use grid::{fitting_edges, fitting_profile_edges};
 pub use kernel::{Kernel, KernelError, mix_kernels};
 pub use largest_size::{LargestSize, largest_size};
 pub use options::{Bootstrap, Method, Resampling, UnfoldOptions};
@@ -111,7 +113,7 @@ pub use size_bins::{
     ReportedEdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges,
 };
 pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
-pub use stereology_metrics::{EdgesError, Finding, Progress};
+pub use stereology_metrics::{BoundingBox, EdgeRule, EdgeWeights, EdgesError, Finding, Progress, SamplingWindow};
 pub use unfold_error::UnfoldError;
 pub use unfolding::{PenaltyUsed, Unfolding, unfold, unfold_with_progress};
 pub use unknown_fractions::{Fractions, unknown_fractions};

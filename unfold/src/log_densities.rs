@@ -133,7 +133,8 @@ impl Penalty {
         }
     }
 
-    /// ln of the product of the positive eigenvalues of the penalty's matrix at weight 1: that of the differences' Gram matrix.
+    /// ln of the product of the positive eigenvalues of the penalty's matrix at weight 1: that of the differences' Gram
+    /// matrix.
     pub(crate) fn log_pseudo_determinant(nodes: usize, order: usize) -> f64 {
         let stencil = Self::stencil(order);
         let mut gram = Symmetric::zeros(nodes.saturating_sub(order));
@@ -343,7 +344,8 @@ pub(crate) fn climb(
 /// How far to climb.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so what is left is far less.
+    /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so
+    /// what is left is far less.
     last_gain: f64,
     most_steps: usize,
     /// A climb is given up where its value less half the logarithm of the determinant cannot come up to this.

@@ -15,10 +15,10 @@ pub(crate) struct Minimiser {
 
 /// Minimises ‖A x − b‖ over x ≥ 0.
 ///
-/// The columns are scaled to length 1 inside, so that the order of magnitude of a bin plays no part. At the end the gradient
-/// w = Aᵀ (b − A x) is zero where x > 0 and not positive where x = 0, to rounding: the Kuhn-Tucker conditions, which are enough for a minimum.
-/// A column that all but lies in the span of the others has a gradient below rounding however much of b it alone explains; it is judged by
-/// its part outside that span.
+/// The columns are scaled to length 1 inside, so that the order of magnitude of a bin plays no part. At the end the
+/// gradient w = Aᵀ (b − A x) is zero where x > 0 and not positive where x = 0, to rounding: the Kuhn-Tucker conditions,
+/// which are enough for a minimum. A column that all but lies in the span of the others has a gradient below rounding
+/// however much of b it alone explains; it is judged by its part outside that span.
 pub(crate) fn minimise(a: &DMatrix<f64>, b: &DVector<f64>) -> Minimiser {
     let unknowns = a.ncols();
     let lengths: Vec<f64> = a.column_iter().map(|column| column.norm()).collect();
@@ -84,7 +84,8 @@ pub(crate) fn minimise(a: &DMatrix<f64>, b: &DVector<f64>) -> Minimiser {
     }
 }
 
-/// The slope of ‖rest‖ along each column's part outside the span of the free columns, made of length 1; 0 where nothing is outside.
+/// The slope of ‖rest‖ along each column's part outside the span of the free columns, made of length 1; 0 where nothing
+/// is outside.
 fn gradient_outside(a: &DMatrix<f64>, free: &[bool], rest: &DVector<f64>) -> DVector<f64> {
     let span = a.select_columns(&indices(free)).qr().q();
     DVector::from_fn(a.ncols(), |j, _| {

@@ -4,24 +4,27 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Method {
-    /// Chosen from the data: [`Sparse`](Self::Sparse) if its evidence is 20 times that of [`Penalised`](Self::Penalised), else that.
+    /// Chosen from the data: [`Sparse`](Self::Sparse) if its evidence is 20 times that of
+    /// [`Penalised`](Self::Penalised), else that.
     #[default]
     Auto,
-    /// Penalised Poisson likelihood: the logarithm of the density is smooth on the bins of the kernel, but for a bend at one size if the counts tell of one;
-    /// how smooth is for the counts to say. Wants bins finer
-    /// than those reported ([`SizeBins::reported_in`](crate::SizeBins::reported_in)), forty or so, and as many profile bins or more.
+    /// Penalised Poisson likelihood: the logarithm of the density is smooth on the bins of the kernel, but for a bend
+    /// at one size if the counts tell of one; how smooth is for the counts to say. Wants bins finer than those reported
+    /// ([`SizeBins::reported_in`](crate::SizeBins::reported_in)), forty or so, and as many profile bins or more.
     Penalised,
-    /// Maximum of the Poisson likelihood with as few size bins as the counts bear: what EM tends to, less the bins that are not needed. For
-    /// particles of a few sizes, each within a bin.
+    /// Maximum of the Poisson likelihood with as few size bins as the counts bear: what EM tends to, less the bins that
+    /// are not needed. For particles of a few sizes, each within a bin.
     Sparse,
-    /// Maximum of the Poisson likelihood of the profile counts, by expectation-maximisation (Richardson-Lucy), run to convergence.
+    /// Maximum of the Poisson likelihood of the profile counts, by expectation-maximisation (Richardson-Lucy), run to
+    /// convergence.
     Em,
     /// Expectation-maximisation with a little smoothing after every step ([`UnfoldOptions::smoothing`]).
     Ems,
     /// Non-negative least squares: the best fit of the profile densities without negative ones.
     Nnls,
-    /// The paper's: N_V = K⁻¹ N_A by back-substitution (eqs. 4, 8), negative densities set to zero and reported. Needs as many profile bins as
-    /// size bins. Its noise grows with the condition number: for anything but spheres take another method.
+    /// The paper's: N_V = K⁻¹ N_A by back-substitution (eqs. 4, 8), negative densities set to zero and reported. Needs
+    /// as many profile bins as size bins. Its noise grows with the condition number: for anything but spheres take
+    /// another method.
     Paper,
 }
 
@@ -49,24 +52,26 @@ impl Method {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Resampling {
-    /// Counts, Poisson's, with the means of the fit: right where profiles do not know of each other, as on slices farther apart than a particle is wide.
+    /// Counts, Poisson's, with the means of the fit: right where profiles do not know of each other, as on slices
+    /// farther apart than a particle is wide.
     #[default]
     Counts,
-    /// Whole slices, with repetition: right where profiles of a slice go together (layers, clusters, the same particle on the next slice). Needs
-    /// [`ProfileCounts::from_slices`](crate::ProfileCounts::from_slices), and eight slices or more to be worth it.
+    /// Whole slices, with repetition: right where profiles of a slice go together (layers, clusters, the same particle
+    /// on the next slice). Needs [`ProfileCounts::from_slices`](crate::ProfileCounts::from_slices), and eight slices or
+    /// more to be worth it.
     Slices,
 }
 
 /// Intervals from counts that are drawn again and fitted again, corrected for the bias of the estimate.
 ///
-/// A smooth estimate is biased towards smoothness, and its replicates would be so a second time. So what is drawn from and fitted again is rougher: order 2
-/// with a tenth of the weight. With g its value, b the mean of the replicates less g, and σ their standard deviation, the interval is
-/// g − b ± z σ, for single bins g − b ± z √(σ² + b²), widened to hold the estimate. Other methods are their own g; the interval of [`Method::Sparse`] is
-/// that of the likelihood on all bins, so that bins given up have an upper end too.
+/// A smooth estimate is biased towards smoothness, and its replicates would be so a second time. So what is drawn from
+/// and fitted again is rougher: order 2 with a tenth of the weight. With g its value, b the mean of the replicates less
+/// g, and σ their standard deviation, the interval is g − b ± z σ, for single bins g − b ± z √(σ² + b²), widened to
+/// hold the estimate. Other methods are their own g; the interval of [`Method::Sparse`] is that of the likelihood on
+/// all bins, so that bins given up have an upper end too.
 ///
-/// Nominal 90 % on the paper's figure 7 covered 88 to 93 % (total, mean size, volume fraction) and 86 % or more (bins, on average), with counts drawn again
-/// or ten slices: the table is
-/// docs/figures/coverage.csv.
+/// Nominal 90 % on the paper's figure 7 covered 88 to 93 % (total, mean size, volume fraction) and 86 % or more (bins,
+/// on average), with counts drawn again or ten slices: the table is docs/figures/coverage.csv.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bootstrap {
     /// How many times counts are drawn again.
@@ -102,7 +107,8 @@ impl Default for Bootstrap {
 pub struct UnfoldOptions {
     /// The estimator.
     pub method: Method,
-    /// Profiles up to this size are not counted on (missing fines): their bins are left out of the fit, not taken as empty.
+    /// Profiles up to this size are not counted on (missing fines): their bins are left out of the fit, not taken as
+    /// empty.
     pub min_size: Option<f64>,
     /// Intervals, if any.
     pub bootstrap: Option<Bootstrap>,
@@ -115,7 +121,8 @@ pub struct UnfoldOptions {
 }
 
 impl Default for UnfoldOptions {
-    /// `Auto`, no threshold, no intervals; `Em` within 0.01 of the largest log-likelihood, `Ems` with 0.02 to each neighbour.
+    /// `Auto`, no threshold, no intervals; `Em` within 0.01 of the largest log-likelihood, `Ems` with 0.02 to each
+    /// neighbour.
     fn default() -> Self {
         Self {
             method: Method::Auto,

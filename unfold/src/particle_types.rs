@@ -75,8 +75,9 @@ impl TypesUnfolding {
 
 /// Unfolds labelled profiles: counts and kernel of each type, on common edges.
 ///
-/// Where it is known which type each profile belongs to, eq. (9) falls apart into one system a type; their sum, its intervals and the sum of the
-/// refolded counts come out here. Types may share a kernel (colour categories of one body).
+/// Where it is known which type each profile belongs to, eq. (9) falls apart into one system a type; their sum, its
+/// intervals and the sum of the refolded counts come out here. Types may share a kernel (colour categories of one
+/// body).
 ///
 /// # Errors
 ///
@@ -104,7 +105,8 @@ pub fn unfold_types_with_progress(
     }
     let mut parts = Vec::with_capacity(types.len());
     for (index, (counts, kernel)) in types.iter().enumerate() {
-        // Streams of different types are far apart: more replicates than 2^32 are never drawn. Slices are the same for all types.
+        // Streams of different types are far apart: more replicates than 2^32 are never drawn. Slices are the same for
+        // all types.
         let slices = options.bootstrap.is_some_and(|of| of.resampling == Resampling::Slices);
         let stream = if slices { 0 } else { (index as u64) << 32 };
         let share = |done: f64| progress((index as f64 + done) / types.len() as f64);
@@ -147,7 +149,7 @@ pub fn unfold_types_with_progress(
         mean_size: quantities.estimate_up_to(moments.largest(), &|all| {
             moments.mean(&by_number(all), Weighing::Number)
         }),
-        volume_fraction: quantities.estimate_up_to(1.0, &|all| moments.sum(&by_volume(all), 3)),
+        volume_fraction: quantities.estimate(&|all| moments.sum(&by_volume(all), 3)),
         surface_density: surfaces
             .map(|surfaces| quantities.estimate(&|all| moments.sum(&weighed(all, &surfaces, bins), 2))),
         distribution: describe(&moments, sizes.reported_edges(), |weighing, most, quantity| {
@@ -175,17 +177,19 @@ fn weighed(all: &[f64], weights: &[f64], bins: usize) -> Vec<f64> {
 
 /// Replicates of all types, number by number.
 fn joined(bootstrap: &Bootstrap, parts: &[Replicated]) -> Replicates {
-    let of = |part: &Replicated, number: Option<usize>| -> Vec<f64> {
-        part.2.as_ref().map_or_else(Vec::new, |replicates| match number {
-            None => replicates.base.clone(),
-            Some(number) => replicates.densities[number].clone(),
-        })
-    };
-    let all = |number: Option<usize>| parts.iter().flat_map(|part| of(part, number)).collect();
+    let replicates: Vec<&Replicates> = parts.iter().filter_map(|part| part.2.as_ref()).collect();
+    let numbers = 0..bootstrap.replicates;
+    let base = |of: &&Replicates, number: usize| of.bases[of.base_of[number]].clone();
     Replicates {
-        base: all(None),
-        densities: (0..bootstrap.replicates).map(|number| all(Some(number))).collect(),
+        bases: numbers
+            .clone()
+            .map(|number| replicates.iter().flat_map(|of| base(of, number)).collect())
+            .collect(),
+        base_of: numbers.clone().collect(),
+        densities: numbers
+            .map(|number| replicates.iter().flat_map(|of| of.densities[number].clone()).collect())
+            .collect(),
         bootstrap: *bootstrap,
-        slices: parts.iter().filter_map(|part| part.2.as_ref()?.slices).min(),
+        slices: replicates.iter().filter_map(|of| of.slices).min(),
     }
 }

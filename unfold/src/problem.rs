@@ -1,7 +1,10 @@
 //! The part of counts and kernel above the threshold, on the bins of the kernel and on those that are reported.
 
-use crate::log_densities::Design;
-use crate::{Bootstrap, Kernel, ProfileCounts, UnfoldError, UnfoldOptions};
+use crate::grid::{Grid, grids};
+use crate::kernel::Kernel;
+use crate::options::{Bootstrap, UnfoldOptions};
+use crate::profile_counts::ProfileCounts;
+use crate::unfold_error::UnfoldError;
 use nalgebra::{DMatrix, DVector};
 
 /// Counts that are Poisson's, and what particles of each bin show of them.
@@ -10,10 +13,8 @@ pub(crate) struct Problem {
     pub(crate) fine: DMatrix<f64>,
     /// The same by reported bin, with particles spread over its kept bins as the kernel has it.
     pub(crate) coarse: DMatrix<f64>,
-    /// `fine` for densities relative to the width of a bin, made when it is first needed.
-    pub(crate) design: Design,
-    /// Width of each kept bin over the mean width.
-    pub(crate) widths: Vec<f64>,
+    /// Internal grids of the smooth estimate, made from the kept bins.
+    pub(crate) grids: Vec<Grid>,
     /// Counts above the threshold over their dispersion.
     pub(crate) counts: Vec<f64>,
     /// Index of each kept bin among the kernel's.
@@ -76,15 +77,14 @@ impl Problem {
             let mut column = coarse.column_mut(group);
             column += fine.column(k) * share;
         }
-        let mut relative = fine.clone();
-        for (mut column, &width) in relative.column_iter_mut().zip(&widths) {
-            column *= width;
-        }
+        let kept_edges: Vec<(f64, f64)> = columns
+            .iter()
+            .map(|&j| (sizes.edges()[j], sizes.edges()[j + 1]))
+            .collect();
         Ok(Self {
-            design: Design::new(&relative),
+            grids: grids(&fine, &kept_edges, sizes.is_spread()),
             fine,
             coarse,
-            widths,
             counts: kept.iter().map(|count| count / counts.dispersion()).collect(),
             columns,
             reported,
@@ -106,23 +106,6 @@ impl Problem {
             coarse[group] += density;
         }
         coarse
-    }
-
-    /// Densities of the kept bins from logarithms of densities relative to their widths.
-    pub(crate) fn with_logarithms(&self, theta: &[f64]) -> Vec<f64> {
-        theta
-            .iter()
-            .zip(&self.widths)
-            .map(|(t, width)| t.exp() * width)
-            .collect()
-    }
-
-    /// The size at a share of the kept bins, `edges` those of the kernel.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Between zero and the number of bins.
-    pub(crate) fn size_at(&self, edges: &[f64], share: f64) -> f64 {
-        let place = share * self.columns.len() as f64;
-        let bin = self.columns[(place as usize).min(self.columns.len() - 1)];
-        edges[bin] + place.fract() * (edges[bin + 1] - edges[bin])
     }
 
     /// Expected counts.

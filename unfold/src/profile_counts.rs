@@ -7,8 +7,8 @@ const MOST_SLICES: usize = 1_000_000;
 
 /// Profiles counted in bins (a, b] of their size, on a known area.
 ///
-/// Bins are closed above: a profile exactly as large as the largest particle belongs to the last bin. The density of profiles is singular
-/// there, so bins closed below would move the result by up to 1.6 %.
+/// Bins are closed above: a profile exactly as large as the largest particle belongs to the last bin. The density of
+/// profiles is singular there, so bins closed below would move the result by up to 1.6 %.
 ///
 /// # Examples
 ///
@@ -107,12 +107,13 @@ pub enum ProfilesError {
 impl ProfileCounts {
     /// Counts profile sizes (diameters of the circles of their areas) in the bins between `edges`, on `area`.
     ///
-    /// `weights`, one a profile, multiply its count: Miles-Lantuejoul weights of edge correction, or 0 outside a counting frame. Profiles not
-    /// larger than the first edge are not counted. Takes `sizes` × log(`edges`) steps.
+    /// `weights`, one a profile, multiply its count: Miles-Lantuejoul weights of edge correction, or 0 outside a
+    /// counting frame. Profiles not larger than the first edge are not counted. Takes `sizes` × log(`edges`) steps.
     ///
     /// # Errors
     ///
-    /// [`ProfilesError`]: no profiles, sizes or weights that are no such thing, sizes beyond the last edge, a bad area or bad edges.
+    /// [`ProfilesError`]: no profiles, sizes or weights that are no such thing, sizes beyond the last edge, a bad area
+    /// or bad edges.
     pub fn from_sizes(sizes: &[f64], weights: Option<&[f64]>, edges: &[f64], area: f64) -> Result<Self, ProfilesError> {
         check_edges(edges)?;
         check_area(area)?;
@@ -180,10 +181,11 @@ impl ProfileCounts {
         })
     }
 
-    /// [`from_sizes`](Self::from_sizes) with the slice each profile is on, so that slices can be drawn again ([`Resampling::Slices`](crate::Resampling)).
+    /// [`from_sizes`](Self::from_sizes) with the slice each profile is on, so that slices can be drawn again
+    /// ([`Resampling::Slices`](crate::Resampling)).
     ///
-    /// `area` is that of all slices together; slices are taken to be equally large, and one without profiles is only known of if its number
-    /// lies between others': numbers run from 0 to the largest.
+    /// `area` is that of all slices together; slices are taken to be equally large, and one without profiles is only
+    /// known of if its number lies between others': numbers run from 0 to the largest.
     ///
     /// # Errors
     ///
@@ -298,7 +300,8 @@ impl ProfileCounts {
         self.slices.as_ref().map(Vec::len)
     }
 
-    /// At least so many slices, those beyond what profiles told without any: for a part of the profiles that has none on the last slices.
+    /// At least so many slices, those beyond what profiles told without any: for a part of the profiles that has none
+    /// on the last slices.
     ///
     /// ```
     /// use stereology_unfold::ProfileCounts;

@@ -24,19 +24,23 @@ const COARSE: usize = 24;
 /// Values between the neighbours of the best.
 const DETAIL: usize = 12;
 
-/// Finds a parameter of the kernel by profile likelihood, the densities integrated out: for every value the evidence of the smooth estimate.
+/// Finds a parameter of the kernel by profile likelihood, the densities integrated out: for every value the evidence of
+/// the smooth estimate.
 ///
-/// `kernel_of` gives the kernel for a value, for the same profile bins throughout; fine bins, where profiles near the largest size tell (they are counted in
-/// `counts`). It may refuse a value with an error, which ends the search. `range` is searched in 24 steps and then around the best; `level` is the nominal
-/// coverage of the interval. Takes as long as 37 fits and kernels.
+/// `kernel_of` gives the kernel for a value, for the same profile bins throughout; fine bins, where profiles near the
+/// largest size tell (they are counted in `counts`). It may refuse a value with an error, which ends the search.
+/// `range` is searched in 24 steps and then around the best; `level` is the nominal coverage of the interval. Takes as
+/// long as 37 fits and kernels.
 ///
-/// For the scale s of eq. (7) with particles all alike, `kernel_of(s)` has the one size s; for the largest size it has sizes spread up to s. That is not
-/// biased low as the largest profile is. Where the density falls to nothing before the largest size, as for a single mode, no counts tell that size, and the
-/// result is `unbounded`; it does not matter either. For the capping angle see [`capped_kernel`](crate::capped_kernel).
+/// For the scale s of eq. (7) with particles all alike, `kernel_of(s)` has the one size s; for the largest size it has
+/// sizes spread up to s. That is not biased low as the largest profile is. Where the density falls to nothing before
+/// the largest size, as for a single mode, no counts tell that size, and the result is `unbounded`; it does not matter
+/// either. For the capping angle see [`capped_kernel`](crate::capped_kernel).
 ///
 /// # Errors
 ///
-/// [`UnfoldError::Range`] for a range that is none or in which no value can explain the profiles; errors of the kernels and the fit.
+/// [`UnfoldError::Range`] for a range that is none or in which no value can explain the profiles; errors of the kernels
+/// and the fit.
 ///
 /// # Examples
 ///

@@ -42,9 +42,11 @@ pub fn geometric_edges(smallest: f64, largest: f64, bins: usize) -> Vec<f64> {
     std::iter::once(0.0).chain((0..=bins).map(step)).collect()
 }
 
-/// Edges that grow by half a φ: sizes 2^(k/2) times the unit, Krumbein's scale (φ = −log₂ of the size in millimetres), after a first bin (0, a].
+/// Edges that grow by half a φ: sizes 2^(k/2) times the unit, Krumbein's scale (φ = −log₂ of the size in millimetres),
+/// after a first bin (0, a].
 ///
-/// The edges are those of the scale itself, whatever the sizes; the last is the first at or above `largest`, the first at or below `smallest`.
+/// The edges are those of the scale itself, whatever the sizes; the last is the first at or above `largest`, the first
+/// at or below `smallest`.
 ///
 /// ```
 /// let edges = stereology_unfold::phi_edges(0.3, 1.0, 1.0);
@@ -62,8 +64,8 @@ pub fn phi_edges(smallest: f64, largest: f64, step: f64) -> Vec<f64> {
     std::iter::once(0.0).chain(classes.map(|k| (k * step).exp2())).collect()
 }
 
-/// How many equal bins of (0, `largest`] so many profiles bear: the most, up to `most`, such that every bin that has profiles has five or more and that
-/// there are no more than 2 ∛n (Rice's rule).
+/// How many equal bins of (0, `largest`] so many profiles bear: the most, up to `most`, such that every bin that has
+/// profiles has five or more and that there are no more than 2 ∛n (Rice's rule).
 ///
 /// ```
 /// let sizes: Vec<f64> = (1..=1000).map(|k| f64::from(k) / 1000.0).collect();
@@ -85,7 +87,8 @@ pub fn automatic_bins(sizes: &[f64], largest: f64, most: usize) -> usize {
     (1..=rice.min(most)).rev().find(|&bins| !few(bins)).unwrap_or(1)
 }
 
-/// Edges that divide each bin evenly so that there are at least `bins` in all, with an edge at `threshold` if it falls inside.
+/// Edges that divide each bin evenly so that there are at least `bins` in all, with an edge at `threshold` if it falls
+/// inside.
 ///
 /// ```
 /// assert_eq!(stereology_unfold::divided_edges(&[0.0, 1.0, 2.0], 4, 0.25), [0.0, 0.25, 0.5, 1.0, 1.5, 2.0]);
@@ -109,8 +112,9 @@ pub fn divided_edges(edges: &[f64], bins: usize, threshold: f64) -> Vec<f64> {
 
 /// Bins of particle sizes, how the sizes lie in them, and the bins results are reported in.
 ///
-/// The sizes must be those the kernel was made for: [`SizeBins::upper_edge`] with an upper-edge kernel, [`SizeBins::integrated`] with a
-/// bin-integrated one. A smooth estimate wants finer bins than are reported: [`SizeBins::reported_in`].
+/// The sizes must be those the kernel was made for: [`SizeBins::upper_edge`] with an upper-edge kernel,
+/// [`SizeBins::integrated`] with a bin-integrated one. A smooth estimate wants finer bins than are reported:
+/// [`SizeBins::reported_in`].
 ///
 /// ```
 /// use stereology_unfold::{SizeBins, divided_edges, equal_edges};

@@ -24,8 +24,9 @@ pub struct SizeDistribution {
     pub by_number: Percentiles,
     /// Every particle counts with its volume.
     pub by_volume: Percentiles,
-    /// The sieve curve: the share of the particles' volume below each edge of the bins, from the first to the last. A sieve lets a particle pass by
-    /// its middle axis; here the size is the diameter of the circle with the area of its largest section.
+    /// The sieve curve: the share of the particles' volume below each edge of the bins, from the first to the last. A
+    /// sieve lets a particle pass by its middle axis; here the size is the diameter of the circle with the area of its
+    /// largest section.
     pub passing: Vec<Estimate>,
 }
 
@@ -130,7 +131,8 @@ impl Moments {
     }
 }
 
-/// The distribution, with `estimate` giving a quantity of the densities, up to a limit, its value and interval; where densities count by volume they are weighed as well.
+/// The distribution, with `estimate` giving a quantity of the densities, up to a limit, its value and interval; where
+/// densities count by volume they are weighed as well.
 pub(crate) fn describe(
     moments: &Moments,
     reported_edges: &[f64],
@@ -162,7 +164,8 @@ mod tests {
     use crate::{SizeBins, equal_edges};
     use proptest::prelude::*;
 
-    /// Sizes spread evenly over (0, 1]: mean 1/2, median 1/2; by volume, density 4 D³: mean 4/5, median 2^(-1/4), half way down 1/16 passes.
+    /// Sizes spread evenly over (0, 1]: mean 1/2, median 1/2; by volume, density 4 D³: mean 4/5, median 2^(-1/4), half
+    /// way down 1/16 passes.
     #[test]
     fn a_flat_distribution_has_its_known_percentiles() {
         let edges = equal_edges(1.0, 8);

@@ -1,8 +1,9 @@
 //! The sparse estimate: the largest likelihood with as few size bins as the counts bear.
 //!
-//! Every bin is worth keeping only if it raises the log-likelihood by more than its price, ½ ln n + ln 2 for n profiles: half of Schwarz's
-//! criterion, and odds of two to one against every bin. Bins are given up one by one, the least significant first by Wald's statistic, and the best
-//! of the nested sets is taken. Its log-likelihood less the prices stands for its evidence.
+//! Every bin is worth keeping only if it raises the log-likelihood by more than its price, ½ ln n + ln 2 for n
+//! profiles: half of Schwarz's criterion, and odds of two to one against every bin. Bins are given up one by one, the
+//! least significant first by Wald's statistic, and the best of the nested sets is taken. Its log-likelihood less the
+//! prices stands for its evidence.
 
 use crate::log_densities::{Design, Effort, Peak, Penalty, Start, Workspace, climb};
 use crate::penalised::level;
@@ -73,7 +74,8 @@ fn fit(bins: usize, kept: &[usize], theta: &[f64], evidence: f64) -> SparseFit {
     }
 }
 
-/// The bin whose density is the fewest standard errors above zero, among those without which the counts can still be explained.
+/// The bin whose density is the fewest standard errors above zero, among those without which the counts can still be
+/// explained.
 fn least_significant(
     matrix: &DMatrix<f64>,
     counts: &[f64],

@@ -5,7 +5,7 @@ use crate::estimate::{CrossCheck, Estimate, Interval};
 use crate::estimator::{Fit, again, estimate, workspace};
 use crate::findings::findings;
 use crate::kernel::{Kernel, condition_number};
-use crate::options::{Method, UnfoldOptions};
+use crate::options::{Bootstrap, Method, UnfoldOptions};
 use crate::problem::Problem;
 use crate::profile_counts::{ProfileCounts, mean_profile_area};
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
@@ -30,8 +30,8 @@ pub struct PenaltyUsed {
 pub struct Unfolding {
     /// Edges of the size bins.
     pub edges: Vec<f64>,
-    /// Particles per unit volume in each size bin; `None` where no profile above the threshold can come from. Of a bin the threshold falls in, if the
-    /// kernel's bins have an edge there, only those above.
+    /// Particles per unit volume in each size bin; `None` where no profile above the threshold can come from. Of a bin
+    /// the threshold falls in, if the kernel's bins have an edge there, only those above.
     pub number_density: Vec<Option<f64>>,
     /// Intervals of `number_density`, with a bootstrap.
     pub intervals: Option<Vec<Option<Interval>>>,
@@ -55,10 +55,11 @@ pub struct Unfolding {
     pub refolded: Vec<f64>,
     /// Eq. (1), N_A = H N_V: profiles above the threshold per unit area.
     pub profiles_per_area: CrossCheck,
-    /// V_V = A_A: the area fraction of the profiles above the threshold, against the volume fraction; with a threshold, against what the densities would
-    /// show above it.
+    /// V_V = A_A: the area fraction of the profiles above the threshold, against the volume fraction; with a threshold,
+    /// against what the densities would show above it.
     pub area_fraction: CrossCheck,
-    /// Poisson deviance of the counts from the refolded ones above the threshold: near `degrees_of_freedom` for a good fit if bins hold five or more.
+    /// Poisson deviance of the counts from the refolded ones above the threshold: near `degrees_of_freedom` for a good
+    /// fit if bins hold five or more.
     pub deviance: f64,
     /// Profile bins less parameters in effect, not below zero.
     pub degrees_of_freedom: usize,
@@ -83,8 +84,8 @@ pub struct Unfolding {
 }
 
 impl Unfolding {
-    /// Values of the profile bins, `observed` or `refolded`, summed to the bins between `edges`, which should be edges of theirs too: a profile bin counts
-    /// where its middle lies.
+    /// Values of the profile bins, `observed` or `refolded`, summed to the bins between `edges`, which should be edges
+    /// of theirs too: a profile bin counts where its middle lies.
     #[must_use]
     pub fn profiles_in(&self, edges: &[f64], values: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; edges.len().saturating_sub(1)];
@@ -115,13 +116,14 @@ impl Unfolding {
 /// V_V = v Σ N_V(j) ⟨D³⟩_j,   v the body's volume at size 1
 /// ```
 ///
-/// With a threshold ([`UnfoldOptions::min_size`]) the rows of the profile bins below it are left out of the fit, not taken as empty; size bins
-/// that show nothing above it get `None`, and totals are over the rest: nothing is extrapolated.
+/// With a threshold ([`UnfoldOptions::min_size`]) the rows of the profile bins below it are left out of the fit, not
+/// taken as empty; size bins that show nothing above it get `None`, and totals are over the rest: nothing is
+/// extrapolated.
 ///
 /// # Errors
 ///
-/// [`UnfoldError`]: kernel and counts that do not fit, a kernel without inverse for [`Method::Paper`], profiles no particle can show, a
-/// threshold that leaves nothing, a bad bootstrap or tolerance.
+/// [`UnfoldError`]: kernel and counts that do not fit, a kernel without inverse for [`Method::Paper`], profiles no
+/// particle can show, a threshold that leaves nothing, a bad bootstrap or tolerance.
 ///
 /// # Examples
 ///
@@ -178,43 +180,82 @@ pub(crate) fn unfold_replicated(
         None => None,
         Some(bootstrap) => {
             let slices = slices_drawn(bootstrap, counts.slices())?;
-            let mut room = workspace(&problem);
-            let base = again(&problem, &problem.counts, &fit.again, options, &mut room)?;
-            let expected = problem.refold(&base);
-            let by_slice: Vec<Vec<f64>> = match (slices, counts.by_slice()) {
-                (Some(_), Some(by_slice)) => by_slice
-                    .iter()
-                    .map(|slice| {
-                        let above = slice[problem.first_row..].iter();
-                        above.map(|count| count / counts.dispersion()).collect()
-                    })
-                    .collect(),
-                _ => Vec::new(),
-            };
-            let source = if slices.is_some() {
-                Source::Slices(&by_slice)
-            } else {
-                Source::Expected(&expected)
-            };
-            let densities = replicate(
-                bootstrap,
-                stream,
-                &source,
-                problem.columns.len(),
-                progress,
-                || workspace(&problem),
-                |drawn, room| again(&problem, drawn, &fit.again, options, room),
-            )?;
-            Some(Replicates {
-                base: problem.widen(&base, bins),
-                densities: densities.iter().map(|one| problem.widen(one, bins)).collect(),
-                bootstrap: *bootstrap,
-                slices,
-            })
+            Some(resampled(
+                &problem, counts, options, bootstrap, &fit, slices, stream, progress, bins,
+            )?)
         }
     };
     let unfolding = result(&problem, counts, kernel, options, &fit, replicates.as_ref());
     Ok((unfolding, problem.widen(&fit.densities, bins), replicates))
+}
+
+/// Counts drawn from each of the fits that the counts allow, in proportion to their weight, and fitted again.
+#[allow(clippy::too_many_arguments, reason = "one call")]
+fn resampled(
+    problem: &Problem,
+    counts: &ProfileCounts,
+    options: &UnfoldOptions,
+    bootstrap: &Bootstrap,
+    fit: &Fit,
+    slices: Option<usize>,
+    stream: u64,
+    progress: Progress<'_>,
+    bins: usize,
+) -> Result<Replicates, UnfoldError> {
+    let mut room = workspace(problem);
+    let bases = fit
+        .again
+        .iter()
+        .map(|(_, refit)| again(problem, &problem.counts, refit, options, &mut room))
+        .collect::<Result<Vec<_>, _>>()?;
+    let expected: Vec<Vec<f64>> = bases.iter().map(|base| problem.refold(base)).collect();
+    let by_slice: Vec<Vec<f64>> = match (slices, counts.by_slice()) {
+        (Some(_), Some(by_slice)) => {
+            let above = |slice: &Vec<f64>| {
+                slice[problem.first_row..]
+                    .iter()
+                    .map(|n| n / counts.dispersion())
+                    .collect()
+            };
+            by_slice.iter().map(above).collect()
+        }
+        _ => Vec::new(),
+    };
+    let whole: f64 = fit.again.iter().map(|(weight, _)| weight).sum();
+    // Replicate k belongs to the fit in which the cumulative weight passes (k + 1/2) / B.
+    let base_of: Vec<usize> = (0..bootstrap.replicates)
+        .map(|k| {
+            let place = whole * (k as f64 + 0.5) / bootstrap.replicates as f64;
+            let mut below = 0.0;
+            let passed = fit.again.iter().position(|(weight, _)| {
+                below += weight;
+                below > place
+            });
+            passed.unwrap_or(0)
+        })
+        .collect();
+    let densities = replicate(
+        bootstrap,
+        stream,
+        |task| {
+            if slices.is_some() {
+                Source::Slices(&by_slice)
+            } else {
+                Source::Expected(&expected[base_of[task]])
+            }
+        },
+        problem.columns.len(),
+        progress,
+        || workspace(problem),
+        |task, drawn, room| again(problem, drawn, &fit.again[base_of[task]].1, options, room),
+    )?;
+    Ok(Replicates {
+        bases: bases.iter().map(|base| problem.widen(base, bins)).collect(),
+        base_of,
+        densities: densities.iter().map(|one| problem.widen(one, bins)).collect(),
+        bootstrap: *bootstrap,
+        slices,
+    })
 }
 
 /// Quantities of densities on all bins of a kernel, with their intervals.
@@ -275,7 +316,8 @@ fn result(
         let wide = nalgebra::DVector::from_column_slice(&densities);
         (kernel.matrix() * wide).iter().copied().collect()
     };
-    let volume_fraction = quantities.estimate_up_to(1.0, &|densities| kernel.unit_volume() * moments.sum(densities, 3));
+    // Not cut at 1: a fraction above 1 says that area, sizes or shape are wrong.
+    let volume_fraction = quantities.estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
     let rows = problem.counts.len();
     Unfolding {
         edges: sizes.reported_edges().to_vec(),
@@ -314,10 +356,10 @@ fn result(
         method: fit.method,
         evidence_for_sparse: fit.for_sparse,
         evidence: fit.evidence,
-        penalty: fit.penalty.map(|penalty| PenaltyUsed {
+        penalty: fit.penalty.map(|(penalty, bend)| PenaltyUsed {
             order: penalty.order,
             weight: penalty.weight,
-            bend: penalty.bend.map(|share| problem.size_at(sizes.edges(), share)),
+            bend,
         }),
         clamped_bins: fit.negative.iter().map(|&(k, _)| problem.reported[k]).collect(),
         iterations: fit.iterations,

@@ -1,6 +1,8 @@
-//! Several types whose profiles cannot be told apart, in unknown fractions, with one size distribution: eqs. (10)-(12) where P(i) is sought as well.
+//! Several types whose profiles cannot be told apart, in unknown fractions, with one size distribution: eqs. (10)-(12)
+//! where P(i) is sought as well.
 //!
-//! Often the counts cannot tell: a broad distribution of one type and a slightly different one of another show the same profiles. Then the answer is that.
+//! Often the counts cannot tell: a broad distribution of one type and a slightly different one of another show the same
+//! profiles. Then the answer is that.
 
 use crate::estimator::estimate;
 use crate::kernel::condition_number;
@@ -17,8 +19,8 @@ pub struct Fractions {
     pub fractions: Vec<f64>,
     /// Interval of each, the others in proportion.
     pub intervals: Vec<Interval>,
-    /// How alike the profiles of the types are at these fractions: the condition number of their profile densities, each over the root of the mean. 1 is wholly
-    /// different; beyond some tens hardly any counts tell them apart.
+    /// How alike the profiles of the types are at these fractions: the condition number of their profile densities,
+    /// each over the root of the mean. 1 is wholly different; beyond some tens hardly any counts tell them apart.
     pub condition_number: f64,
 }
 
@@ -27,15 +29,16 @@ const WIDEST: f64 = 0.5;
 /// Rounds over the types; with two one is enough.
 const ROUNDS: usize = 3;
 
-/// Estimates the fractions of types, of which `kernels` are the kernels on common bins, from profiles that do not tell their type.
+/// Estimates the fractions of types, of which `kernels` are the kernels on common bins, from profiles that do not tell
+/// their type.
 ///
-/// The fraction of one type at a time, the others in proportion, is found by profile likelihood with the sizes integrated out, and its interval at
-/// `level` with it. Then unfold with [`Kernel::mix`].
+/// The fraction of one type at a time, the others in proportion, is found by profile likelihood with the sizes
+/// integrated out, and its interval at `level` with it. Then unfold with [`Kernel::mix`].
 ///
 /// # Errors
 ///
-/// [`UnfoldError::FractionsUnknowable`] if the interval of a fraction is wider than 0.5, so that the counts do not tell; [`UnfoldError::Bins`] without two
-/// kernels; and as [`unfold`](crate::unfold).
+/// [`UnfoldError::FractionsUnknowable`] if the interval of a fraction is wider than 0.5, so that the counts do not
+/// tell; [`UnfoldError::Bins`] without two kernels; and as [`unfold`](crate::unfold).
 ///
 /// # Examples
 ///

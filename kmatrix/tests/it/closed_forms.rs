@@ -1,5 +1,5 @@
-//! Boxes and cylinders, whose sections have areas in closed form: their laws by quadrature over directions and bisection over depths,
-//! without a mesh, a sweep or a random number; and what the sweep says of them.
+//! Boxes and cylinders, whose sections have areas in closed form: their laws by quadrature over directions and
+//! bisection over depths, without a mesh, a sweep or a random number; and what the sweep says of them.
 
 use crate::meshes::body;
 use approx::assert_relative_eq;
@@ -30,8 +30,8 @@ impl Central for Brick {
         direction.dot(&Vector3::from(self.0))
     }
 
-    /// What lies below the plane in the positive octant of the lowest corner is a simplex; those of the other seven corners are taken away and
-    /// added again. A = Σ ± (h − h_corner)₊² / (2 u₁ u₂ u₃).
+    /// What lies below the plane in the positive octant of the lowest corner is a simplex; those of the other seven
+    /// corners are taken away and added again. A = Σ ± (h − h_corner)₊² / (2 u₁ u₂ u₃).
     fn area(&self, direction: &Vector3<f64>, depth: f64) -> f64 {
         let corners = (0..8_u8).map(|corner| {
             let side = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
@@ -156,7 +156,8 @@ fn largest(of: &impl Central) -> f64 {
     best
 }
 
-/// The law of the mesh, for every seed, is within its reported error of the quadrature; `slack` is what quadrature and tessellation are off by.
+/// The law of the mesh, for every seed, is within its reported error of the quadrature; `slack` is what quadrature and
+/// tessellation are off by.
 fn judge(name: &str, exact: &Quadrature, body: &Body, slack: f64) {
     assert_relative_eq!(body.largest_section_area(), exact.max_area, max_relative = slack);
     assert_relative_eq!(body.mean_width(), exact.caliper, max_relative = 1e-3);

@@ -25,7 +25,8 @@ fn mean_square_area_is_the_self_energy() {
     assert_relative_eq!(ball.self_energy(), 16.0 * PI * PI / 15.0, max_relative = 0.01);
 }
 
-/// Two unit cubes far apart: their own energies, and that of two points a distance away (no plane knows of it but through the total area).
+/// Two unit cubes far apart: their own energies, and that of two points a distance away (no plane knows of it but
+/// through the total area).
 #[test]
 fn energy_of_two_bodies_has_their_interaction() {
     let cube = TriangleMesh::cuboid([1.0; 3]);

@@ -43,7 +43,8 @@ fn stretched_sphere_mesh_tends_to_the_ellipsoid() {
     assert!(error < 5e-3);
 }
 
-/// The volume of a body is the integral of its section areas over offsets, for every direction: so V = H_eff A_max ∫ x² dF.
+/// The volume of a body is the integral of its section areas over offsets, for every direction: so V = H_eff A_max ∫ x²
+/// dF.
 #[test]
 fn mean_profile_area_is_volume_over_effective_caliper() {
     for triangles in [
@@ -78,7 +79,8 @@ fn torus_has_its_known_lengths() {
     assert!(law.caliper_holes() > 0.0);
 }
 
-/// The sweep's own count of profiles minus holes is the signed mean width, whatever the topology; not where a mesh cuts through itself.
+/// The sweep's own count of profiles minus holes is the signed mean width, whatever the topology; not where a mesh cuts
+/// through itself.
 #[test]
 fn swept_profiles_minus_holes_are_the_signed_mean_width() {
     for triangles in [
@@ -127,7 +129,8 @@ fn bodies_with_arms_show_several_profiles_a_hit() {
     );
 }
 
-/// A void inside is a hole of every section through it: as wide, on average, as the void itself. H_chi counts it with a minus sign.
+/// A void inside is a hole of every section through it: as wide, on average, as the void itself. H_chi counts it with a
+/// minus sign.
 #[test]
 fn holes_of_an_inner_void_are_its_mean_width() {
     let law = law(&body(hollow_cube()), 32 * 32);

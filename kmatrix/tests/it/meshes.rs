@@ -12,7 +12,8 @@ pub(crate) fn torus() -> TriangleMesh {
     TriangleMesh::torus(2.0, 0.8, 24, 12)
 }
 
-/// The surface of unit cells on a grid, as triangles: any solid of unit cubes that do not touch in edges or corners only.
+/// The surface of unit cells on a grid, as triangles: any solid of unit cubes that do not touch in edges or corners
+/// only.
 pub(crate) fn cubes(cells: &[[i32; 3]]) -> TriangleMesh {
     let mut mesh = TriangleMesh {
         vertices: Vec::new(),

@@ -39,7 +39,8 @@ fn the_stencil_buffer_finds_the_same_law() {
     assert!(matches!(refused, Err(SectionLawError::TooFew { .. })));
 }
 
-/// Saltikov's geometric classes can be inverted too; equal classes are no worse for spheres, and far better for cubes of few bins.
+/// Saltikov's geometric classes can be inverted too; equal classes are no worse for spheres, and far better for cubes
+/// of few bins.
 #[test]
 fn classes_are_compared_by_their_condition() {
     let edges = geometric_classes(12);

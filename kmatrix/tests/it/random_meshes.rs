@@ -1,5 +1,5 @@
-//! Every identity of the section law, on meshes drawn at random: rocks, rough rocks, boxes, prisms over random polygons, tori, unions of
-//! cubes, hollow ones, pairs; stretched, turned and moved.
+//! Every identity of the section law, on meshes drawn at random: rocks, rough rocks, boxes, prisms over random
+//! polygons, tori, unions of cubes, hollow ones, pairs; stretched, turned and moved.
 
 use crate::meshes::{body, cubes, placed};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -76,7 +76,8 @@ fn solids() -> impl Strategy<Value = TriangleMesh> {
         })
 }
 
-/// ½ ∬ dx dy / |x − y| over the solid, by the divergence theorem twice: −¼ ∮∮ |x − y| n·n′ dS dS′, smooth but for the kink where x = y.
+/// ½ ∬ dx dy / |x − y| over the solid, by the divergence theorem twice: −¼ ∮∮ |x − y| n·n′ dS dS′, smooth but for the
+/// kink where x = y.
 fn self_energy(mesh: &TriangleMesh) -> f64 {
     let points: Vec<(Vector3<f64>, Vector3<f64>)> = mesh
         .triangles
@@ -122,7 +123,8 @@ proptest! {
         }
     }
 
-    /// Mean area of a profile V / H_eff, from the distribution itself; columns; the count of profiles less holes; convex bodies show one profile.
+    /// Mean area of a profile V / H_eff, from the distribution itself; columns; the count of profiles less holes;
+    /// convex bodies show one profile.
     #[test]
     fn first_moments_and_counts(mesh in solids()) {
         let body = body(mesh);

@@ -80,7 +80,7 @@ impl<'a> Fitting<'a> {
             settled.fractions = Some(found);
         }
         Ok(Self {
-            bins: types.unfolding_bins(&edges, threshold, unfold.method, options.sizes),
+            bins: types.unfolding_bins(&edges, profiles.smallest(), threshold, unfold.method, options.sizes),
             profiles,
             types,
             sizes: options.sizes,
@@ -141,9 +141,13 @@ impl<'a> Fitting<'a> {
     /// Findings of [`part`](Self::part) in fewer equal bins.
     fn in_fewer(&self, bins: usize, places: &[usize], of: Option<usize>) -> Vec<Finding> {
         let edges = equal_edges(self.edges[self.edges.len() - 1], bins);
-        let bins = self
-            .types
-            .unfolding_bins(&edges, self.threshold, self.unfold.method, self.sizes);
+        let bins = self.types.unfolding_bins(
+            &edges,
+            self.profiles.smallest(),
+            self.threshold,
+            self.unfold.method,
+            self.sizes,
+        );
         let options = UnfoldOptions {
             bootstrap: None,
             ..self.unfold

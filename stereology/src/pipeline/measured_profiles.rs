@@ -32,6 +32,16 @@ impl MeasuredProfiles {
         Ok(counted)
     }
 
+    /// Size of the smallest profile with a positive weight; infinite without one.
+    pub(crate) fn smallest(&self) -> f64 {
+        let counted = self
+            .sizes
+            .iter()
+            .zip(&self.weights)
+            .filter(|(_, weight)| **weight > 0.0);
+        counted.map(|(size, _)| *size).fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether the particle type of every profile is known.
     pub(crate) fn have_types(&self) -> bool {
         !self.types.is_empty() && self.types.len() == self.sizes.len()

@@ -2,7 +2,7 @@
 
 use crate::pipeline::ParticleTypes;
 use stereology_kmatrix::Sizes;
-use stereology_unfold::{Method, divided_edges};
+use stereology_unfold::{Method, divided_edges, fitting_edges, fitting_profile_edges};
 
 /// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
 /// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
@@ -43,6 +43,26 @@ impl UnfoldingBins {
             },
         }
     }
+
+    /// [`new`](Self::new) with bins from which grids of linear, root and logarithmic spacing can be made, the last from `smallest` on: the size of the
+    /// smallest profile.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
+    /// let bins = UnfoldingBins::for_profiles(&[0.0, 0.5, 1.0], 0.01, 0.0, Method::Auto, Sizes::Integrated);
+    /// assert!(bins.profile_edges.len() > 101 && bins.size_edges.len() > 80);
+    /// ```
+    #[must_use]
+    pub fn for_profiles(edges: &[f64], smallest: f64, threshold: f64, method: Method, sizes: Sizes) -> Self {
+        let fits_grids = matches!(method, Method::Auto | Method::Penalised | Method::Sparse | Method::Em);
+        if !fits_grids || sizes == Sizes::UpperEdge {
+            return Self::new(edges, threshold, method, sizes);
+        }
+        Self {
+            profile_edges: fitting_profile_edges(edges, PROFILE_BINS, smallest, threshold),
+            size_edges: fitting_edges(edges, smallest, threshold),
+        }
+    }
 }
 
 /// The highest profile bin is widened until it holds this share of the profiles of the largest particles. A body's largest section may hardly ever be met (for
@@ -50,13 +70,13 @@ impl UnfoldingBins {
 const TOP_SHARE: f64 = 0.01;
 
 impl ParticleTypes {
-    /// [`UnfoldingBins::new`] with the highest profile bin so wide that every type shows profiles in it.
+    /// [`UnfoldingBins::for_profiles`] with the highest profile bin so wide that every type shows profiles in it.
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
     /// let edges = [0.0, 0.5, 1.0];
     /// let top = |shape: &str| {
-    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.0, Method::Auto, Sizes::Integrated);
+    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.1, 0.0, Method::Auto, Sizes::Integrated);
     ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
     /// };
     /// assert_eq!(top("sphere")?, 0.99);
@@ -64,8 +84,15 @@ impl ParticleTypes {
     /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
     /// ```
     #[must_use]
-    pub fn unfolding_bins(&self, edges: &[f64], threshold: f64, method: Method, sizes: Sizes) -> UnfoldingBins {
-        let mut bins = UnfoldingBins::new(edges, threshold, method, sizes);
+    pub fn unfolding_bins(
+        &self,
+        edges: &[f64],
+        smallest: f64,
+        threshold: f64,
+        method: Method,
+        sizes: Sizes,
+    ) -> UnfoldingBins {
+        let mut bins = UnfoldingBins::for_profiles(edges, smallest, threshold, method, sizes);
         let (Some(&largest), false) = (edges.last(), method == Method::Paper) else {
             return bins;
         };

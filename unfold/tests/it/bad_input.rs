@@ -29,7 +29,7 @@ fn one_profile_and_equal_profiles_are_unfolded_with_a_warning() {
     }
 }
 
-/// One profile tells little, but no mean beyond the largest size and no share beyond the whole.
+/// With one profile intervals are wide, but the mean size does not exceed the largest size, nor a cumulative fraction 1.
 #[test]
 fn intervals_stay_where_values_can_be() {
     let (kernel, edges) = spheres::fine(&equal_edges(0.5, 1));
@@ -37,7 +37,6 @@ fn intervals_stay_where_values_can_be() {
     let options = UnfoldOptions::default().with_bootstrap(Bootstrap::default());
     let found = unfold(&lone, &kernel, &options).unwrap();
     assert!(found.mean_size.interval.unwrap().upper <= 0.5);
-    assert!(found.volume_fraction.interval.unwrap().upper <= f64::max(1.0, found.volume_fraction.value));
     assert!(
         found
             .distribution

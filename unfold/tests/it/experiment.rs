@@ -1,4 +1,5 @@
-//! The experiment of the paper's figure 7: a periodic box of spheres, ten slices, the profiles counted, the densities known.
+//! The experiment of the paper's figure 7: a periodic box of spheres, ten slices, the profiles counted, the densities
+//! known.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -31,7 +31,8 @@ fn mean_scores(
     (mean, error)
 }
 
-/// The table's rows are means of 200 other samples: ours agree within 5 standard errors of the difference (false alarm below 1e-6 each).
+/// The table's rows are means of 200 other samples: ours agree within 5 standard errors of the difference (false alarm
+/// below 1e-6 each).
 fn agrees(method: Method, kernel: &Kernel, profile_edges: &[f64], table: [[f64; 3]; 4]) {
     for ((name, profiles), expected) in DISTRIBUTIONS.into_iter().zip(table) {
         let (mean, error) = mean_scores(method, kernel, profile_edges, &Design::new(name, profiles), SEEDS);
@@ -88,8 +89,8 @@ fn em() {
     agrees(Method::Em, &spheres::integrated(&edges, &edges), &edges, table);
 }
 
-/// EM with smoothing of .02 after every step, 100 profile bins, the ends of the distribution keeping what smoothing would move out: nowhere worse than the
-/// table, whose ends lose it.
+/// EM with smoothing of .02 after every step, 100 profile bins, the ends of the distribution keeping what smoothing
+/// would move out: nowhere worse than the table, whose ends lose it.
 #[test]
 fn ems() {
     let (sizes, profiles) = (equal_edges(1.0, 10), equal_edges(1.0, 100));
@@ -102,8 +103,8 @@ fn ems() {
     }
 }
 
-/// The default: smooth data within the targets (200 other samples: .065, .13, .11, .03 by number), two narrow bands within .12. Allowed are five standard
-/// errors above what was measured on 200 samples.
+/// The default: smooth data within the targets (200 other samples: .065, .13, .11, .03 by number), two narrow bands
+/// within .12. Allowed are five standard errors above what was measured on 200 samples.
 #[test]
 fn auto() {
     let (kernel, profile_edges) = spheres::fine(&equal_edges(1.0, 10));

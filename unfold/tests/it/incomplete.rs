@@ -6,16 +6,18 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 use stereology_unfold::{
-    Bootstrap, BoundingBox, EdgeRule, Kernel, Method, ProfileCounts, Resampling, SizeBins, UnfoldError, UnfoldOptions,
-    capped_kernel, divided_edges, edge_weights, equal_edges, largest_size, likely_parameter, unfold, unknown_fractions,
+    Bootstrap, BoundingBox, EdgeRule, Kernel, Method, ProfileCounts, Resampling, SamplingWindow, SizeBins, UnfoldError,
+    UnfoldOptions, capped_kernel, divided_edges, equal_edges, largest_size, likely_parameter, unfold,
+    unknown_fractions,
 };
 
 fn sphere(x: f64) -> f64 {
     1.0 - (1.0 - x.min(1.0).powi(2)).sqrt()
 }
 
-/// N_A of discs of diameter 0.2 to 1 in windows three times as wide as the largest, by each rule: right within 1 % (five standard errors of 0.15 %) for
-/// the three that are unbiased, too many by a third with all, too few without those that touch.
+/// N_A of discs of diameter 0.2 to 1 in windows three times as wide as the largest, by each rule: right within 1 %
+/// (five standard errors of 0.15 %) for the three that are unbiased, too many by a third with all, too few without
+/// those that touch.
 #[test]
 fn edge_rules_are_right_or_wrong_by_what_is_known() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -43,7 +45,11 @@ fn edge_rules_are_right_or_wrong_by_what_is_known() {
             })
             .collect();
         for (sum, (rule, _)) in counted.iter_mut().zip(&rules) {
-            *sum += edge_weights(&discs, window, window, *rule).iter().sum::<f64>();
+            *sum += SamplingWindow::continuous(window, window)
+                .weigh(&discs, *rule)
+                .weights
+                .iter()
+                .sum::<f64>();
         }
     }
     for (sum, (rule, right)) in counted.iter().zip(rules) {
@@ -70,7 +76,8 @@ fn kernel_without_a_capping_angle_is_the_closed_one() {
     assert!((sampled.matrix() - closed.matrix()).amax() < 2e-3);
 }
 
-/// Profiles below D sin φ are lost; the angle comes back from the counts, and the density with it, within five standard errors (.02 and 4 %).
+/// Profiles below D sin φ are lost; the angle comes back from the counts, and the density with it, within five standard
+/// errors (.02 and 4 %).
 #[test]
 fn capping_angle_is_found_and_made_good() {
     let design = Design::new("single", 1200.0);
@@ -110,8 +117,8 @@ fn capping_angle_is_found_and_made_good() {
     assert!((totals / truth - 1.0).abs() < 0.08, "{}", totals / truth);
 }
 
-/// The largest size: by its order statistics and by likelihood nearer to the truth than the largest profile, on average over samples whose sizes run evenly up
-/// to 1.
+/// The largest size: by its order statistics and by likelihood nearer to the truth than the largest profile, on average
+/// over samples whose sizes run evenly up to 1.
 #[test]
 fn largest_size_is_less_biased_than_the_largest_profile() {
     let design = Design::new("constant", 1300.0);
@@ -128,7 +135,8 @@ fn largest_size_is_less_biased_than_the_largest_profile() {
     assert_eq!(largest_size(&[]), None);
 }
 
-/// The scale, eq. (7): of particles that are all of one size, and of sizes that run evenly up to the largest, within 2 %; never below the largest profile.
+/// The scale, eq. (7): of particles that are all of one size, and of sizes that run evenly up to the largest, within 2
+/// %; never below the largest profile.
 #[test]
 fn scale_comes_from_the_likelihood() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);

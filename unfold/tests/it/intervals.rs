@@ -44,7 +44,8 @@ fn same_bits_at_any_number_of_threads() {
     assert_eq!(run(1), run(3));
 }
 
-/// So are those of the smooth estimate, each thread with room of its own; and they lie about the estimate, not below zero.
+/// So are those of the smooth estimate, each thread with room of its own; and they lie about the estimate, not below
+/// zero.
 #[test]
 fn smooth_intervals_are_the_same_bits_at_any_number_of_threads() {
     let (kernel, edges) = spheres::fine(&equal_edges(1.0, 10));
@@ -70,8 +71,9 @@ fn smooth_intervals_are_the_same_bits_at_any_number_of_threads() {
     assert!(surface.value > 0.0 && surface.interval.unwrap().upper >= surface.value);
 }
 
-/// Nominal 90 % intervals of the default hold the truth, on the figure's distributions pooled: by the table of coverage 92, 90, 90 and 87 % of (total, mean
-/// size, volume fraction, bins). Of 4 × 25 intervals fewer than 74 happens once in 10^6 at 90 %.
+/// Nominal 90 % intervals of the default hold the truth, on the figure's distributions pooled: by the table of coverage
+/// 92, 90, 90 and 87 % of (total, mean size, volume fraction, bins). Of 4 × 25 intervals fewer than 74 happens once in
+/// 10^6 at 90 %.
 #[test]
 fn smooth_intervals_cover() {
     let (kernel, edges) = spheres::fine(&equal_edges(1.0, 10));
@@ -101,8 +103,8 @@ fn smooth_intervals_cover() {
     assert!(held.iter().all(|&held| held >= 74), "{held:?}");
 }
 
-/// The mean width of nominal 90 % intervals of the total is near 3.3 standard deviations of the total over samples; they cover the truth
-/// somewhat too seldom (true coverage of this case near .9; below 70 of 100 once in 10^8).
+/// The mean width of nominal 90 % intervals of the total is near 3.3 standard deviations of the total over samples;
+/// they cover the truth somewhat too seldom (true coverage of this case near .9; below 70 of 100 once in 10^8).
 #[test]
 fn intervals_are_as_wide_as_estimates_scatter() {
     let truth: f64 = Design::new("constant", 1300.0).densities(10).iter().sum();

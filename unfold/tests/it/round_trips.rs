@@ -38,7 +38,8 @@ fn densities() -> impl Strategy<Value = Vec<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Expected counts of known densities unfold to these densities, by every method and kernel; deviance is zero, the total is eq. (1)'s.
+    /// Expected counts of known densities unfold to these densities, by every method and kernel; deviance is zero, the
+    /// total is eq. (1)'s.
     #[test]
     fn exact_counts_give_exact_densities(truth in densities(), largest in 0.1..50.0_f64, area in 1e2..1e6_f64) {
         let edges = equal_edges(largest, truth.len());
@@ -78,7 +79,8 @@ proptest! {
         }
     }
 
-    /// Nor does the unit of length matter to the smooth estimate and the choice between it and the sparse one, bin by bin.
+    /// Nor does the unit of length matter to the smooth estimate and the choice between it and the sparse one, bin by
+    /// bin.
     #[test]
     fn smooth_unfolding_scales(seed in 0_u64..20, unit in 0.01..100.0_f64) {
         let sizes = Design::new("single", 1200.0).profiles(seed);
@@ -110,7 +112,8 @@ proptest! {
     }
 }
 
-/// A threshold on an edge leaves the bins above untouched when counts are exact, says nothing below, and never extrapolates a total.
+/// A threshold on an edge leaves the bins above untouched when counts are exact, says nothing below, and never
+/// extrapolates a total.
 #[test]
 fn threshold_drops_rows_and_says_nothing_below() {
     let edges = equal_edges(1.0, 5);
@@ -139,7 +142,8 @@ fn threshold_drops_rows_and_says_nothing_below() {
     }
 }
 
-/// Without the threshold the paper's method answers missing fines with negative densities, clamps them, and says so (section 5.2).
+/// Without the threshold the paper's method answers missing fines with negative densities, clamps them, and says so
+/// (section 5.2).
 #[test]
 fn missing_fines_come_out_negative_and_are_reported() {
     let edges = equal_edges(1.0, 5);

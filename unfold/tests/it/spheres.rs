@@ -40,7 +40,8 @@ pub(crate) fn integrated(profile_edges: &[f64], size_edges: &[f64]) -> Kernel {
     Kernel::new(matrix, SizeBins::integrated(size_edges).unwrap(), PI / 6.0).unwrap()
 }
 
-/// The bin-integrated kernel on 40 sub-bins or more, reported in `size_edges`, and the edges of its 100 or more profile bins.
+/// The bin-integrated kernel on 40 sub-bins or more, reported in `size_edges`, and the edges of its 100 or more profile
+/// bins.
 pub(crate) fn fine(size_edges: &[f64]) -> (Kernel, Vec<f64>) {
     let sub_edges = divided_edges(size_edges, 40, 0.0);
     let profile_edges = divided_edges(size_edges, 100, 0.0);

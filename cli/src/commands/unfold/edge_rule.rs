@@ -1,7 +1,7 @@
 //! `--edge-rule`: how much a profile counts at the edge of its slice, from what the table tells of it.
 
 use clap::ValueEnum;
-use stereology::unfold::{self, BoundingBox, edge_weights};
+use stereology::unfold::{self, BoundingBox, SamplingWindow};
 
 use crate::failure::Failure;
 use crate::profile_table::TableProfile;
@@ -37,7 +37,11 @@ impl EdgeRule {
         let name = self.rule().name();
         let boxes: Option<Vec<BoundingBox>> = profiles.iter().map(|profile| profile.bounding_box).collect();
         let weights = match (boxes, window, self) {
-            (Some(boxes), Some([width, height]), _) => edge_weights(&boxes, width, height, self.rule()),
+            (Some(boxes), Some([width, height]), _) => {
+                SamplingWindow::continuous(width, height)
+                    .weigh(&boxes, self.rule())
+                    .weights
+            }
             (_, _, Self::All) => vec![1.0; profiles.len()],
             (_, _, Self::Inside) if profiles.iter().all(|profile| profile.touches_edge.is_some()) => profiles
                 .iter()

@@ -3,8 +3,8 @@
 
 use ndarray::{Array2, Axis};
 use std::ops::ControlFlow;
-use stereology_exemplar::measure::{Family, MeasureOptions, compare, sections};
 use stereology_exemplar::{Domain, Exemplar, SolidOptions, Views, synthesize_solid};
+use stereology_metrics::{Family, MeasureOptions, compare, sections};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let layers = Array2::from_shape_fn((64, 64), |(z, x)| {
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     })?;
     let picture = layers.insert_axis(Axis(2));
     let slices = sections(solid.values.view(), Family::Xz);
-    let found = compare(&[picture.view()], &slices, &MeasureOptions::default(), &|_| {
+    let found = compare(&[picture.view()], &slices, None, &MeasureOptions::new(0.5), &|_| {
         ControlFlow::Continue(())
     })?;
     for (name, figure) in found.figures() {

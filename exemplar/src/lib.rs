@@ -15,7 +15,7 @@
 //! (.0056 between two samples of the picture itself). The number of levels, which was suspected, hardly matters: .011 to .014 for 2 to 4 levels of fringes.
 //! Votes come from ever nearer in the last half of the iterations, which keeps the result sharp.
 //!
-//! [`Method`] has the methods of urs-2012 beside it, [`grow`] grows stone around measurements (stone-2014), [`measure`] judges.
+//! [`Method`] has the methods of urs-2012 beside it, [`grow`] grows stone around measurements (stone-2014).
 //!
 //! # Examples
 //!
@@ -33,14 +33,6 @@
 //! let voxels = solid.values.iter().filter(|v| **v == 1.0).count() as f64;
 //! assert!((voxels - share * 4096.0).abs() <= 0.5);
 //! # Ok::<(), stereology_exemplar::SolidError>(())
-//! ```
-//!
-//! How far apart are two samples of a quantity, each sorted?
-//!
-//! ```
-//! use stereology_exemplar::measure::wasserstein;
-//!
-//! assert!((wasserstein(&[0.0, 1.0, 2.0], &[1.0, 2.0, 3.0]) - 1.0).abs() < 1e-6);
 //! ```
 
 #![allow(
@@ -80,4 +72,3 @@ pub use options::{Method, Search, SolidOptions, Solver, Views};
 pub use scan::Scan;
 pub use synthesis::{LevelReport, Solid, synthesize_solid, synthesize_solid_watched};
 pub mod grow;
-pub mod measure;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conversions::whole_part;
 use crate::error::MicrogeometryError;
+use stereology_metrics::wasserstein_of_bins;
 
 /// Most bins a region may have.
 pub const MOST_BINS: usize = 4096;
@@ -237,12 +238,12 @@ impl ContactDistribution {
         )
     }
 
-    /// Earth mover's distance between two distributions, in bins of this one: the least mean way, in bins, that turns one into the other. Both need the same bin width.
+    /// Earth mover's distance between two distributions, in bins of this one: the mean distance, in bins, by which one must be moved to become the other. Both need the same bin width.
     ///
     /// # Formula
     ///
     /// ```text
-    /// EMD = Σ |F(k) − G(k)|      over the signed bins k, F and G the cumulated shares
+    /// EMD = Σ |F(k) − G(k)|      over the signed bins k; F and G are the cumulative fractions
     /// ```
     ///
     /// ```
@@ -254,22 +255,18 @@ impl ContactDistribution {
     /// ```
     #[must_use]
     pub fn earth_movers_distance(&self, other: &Self) -> f64 {
-        let at = |of: &[f64], k: usize| of.get(k).copied().unwrap_or_default();
-        let (low, high) = (
-            self.negative.len().max(other.negative.len()),
-            self.positive.len().max(other.positive.len()),
-        );
-        let mut ahead = 0.0_f64;
-        let mut work = 0.0;
-        for k in (0..low).rev() {
-            ahead += at(&self.negative, k) - at(&other.negative, k);
-            work += ahead.abs();
-        }
-        for k in 0..high {
-            ahead += at(&self.positive, k) - at(&other.positive, k);
-            work += ahead.abs();
-        }
-        work
+        let negative = self.negative.len().max(other.negative.len());
+        // Bins from the most negative to the most positive.
+        let signed = |of: &Self| {
+            let mut bins = vec![0.0; negative];
+            bins.iter_mut()
+                .zip(&of.negative)
+                .for_each(|(bin, fraction)| *bin = *fraction);
+            bins.reverse();
+            bins.extend(&of.positive);
+            bins
+        };
+        wasserstein_of_bins(signed(self), signed(other))
     }
 
     /// The file's text.

@@ -2,9 +2,9 @@
 
 use image::RgbImage;
 use ndarray::Array2;
-use stereology_metrics::Finding;
+use stereology_metrics::{Finding, KruskalWallis};
 
-use crate::labels::category::{Category, SizeByCategory, categorise, size_by_category};
+use crate::labels::category::{Category, categorise, size_by_category};
 use crate::labels::profile::{Index, Profile, Window, measure, size_of_area, weigh};
 use crate::options::SegmentOptions;
 use crate::quality::profile_findings;
@@ -36,7 +36,7 @@ pub struct Segmentation {
     /// Size of the smallest profile looked for, the circle of [`SegmentOptions::min_area`]: the truncation to hand to unfolding.
     pub min_size: f64,
     /// Whether profiles of different categories differ in size; `None` for fewer than two categories.
-    pub size_by_category: Option<SizeByCategory>,
+    pub size_by_category: Option<KruskalWallis>,
     /// What to know before trusting it. Codes of the photo: `alpha-over-white`, `no-binder`, `vague-binder`, `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`. Of a label map:
     /// `clipped-labels`, `split-label`, `small-labels`, `first-page`, `overlapping-labels`, `lost-labels`.
     pub findings: Vec<Finding>,
@@ -68,7 +68,7 @@ impl Segmentation {
             window: Window { width, height, area },
             area_fraction,
             number_per_area: profiles.iter().map(|p| p.weight).sum::<f64>() / area,
-            size_by_category: size_by_category(&profiles, options.seed),
+            size_by_category: size_by_category(&profiles),
             min_size: size_of_area(options.min_area as f64),
             labels,
             findings: profile_findings(&profiles, area_fraction, frame_limited, options),

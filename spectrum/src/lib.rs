@@ -46,6 +46,7 @@
 //! # Ok::<(), stereology_spectrum::SpectrumError>(())
 //! ```
 
+mod band_pass;
 mod covariance;
 mod error;
 mod periodic;
@@ -53,6 +54,7 @@ mod radial;
 mod real;
 mod transform;
 
+pub use band_pass::BandPass;
 pub use covariance::{autocorrelation, autocovariance, masked_autocovariance};
 pub use error::SpectrumError;
 pub use periodic::periodic_component;

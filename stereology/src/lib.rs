@@ -17,7 +17,8 @@
 //! | [`pyramid`] | What texture looks like this one? |
 //! | [`volume`] | Which colour is at this point of the solid? |
 //! | [`render`] | What does it look like? |
-//! | [`exemplar`] | Which solid has slices like this picture, and how like are they? |
+//! | [`metrics`] | How similar are two samples, label maps or textures? |
+//! | [`exemplar`] | Which solid has slices like this image? |
 //! | [`microgeometry`] | Which relief on this mesh has the contact distribution of that picture? |
 //!
 //! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.

@@ -10,10 +10,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
+use stereology::metrics::label_scores;
 use stereology::segment::read_labels;
 use stereology::shape::{Body, UnitBody};
-
-use crate::label_scores::score;
 
 struct Case {
     /// File in the folder of images.
@@ -105,7 +104,7 @@ fn segmentation(program: &Path, images: &Path, results: &Path) -> Result<String>
         let answer: Value = serde_json::from_slice(&answer.stdout)?;
         let truth = images.join(format!("{stem}_labels.png"));
         let scores = if truth.is_file() {
-            let s = score(&read_labels(&truth)?, &read_labels(out.join("labels.tif"))?)?;
+            let s = label_scores(read_labels(&truth)?.view(), read_labels(out.join("labels.tif"))?.view())?;
             let percent = |v: f64| format!("{:+.1} %", 100.0 * v);
             format!(
                 "{:.3} | {:.3} | {} | {} | {:.3}",

@@ -6,13 +6,14 @@ use std::ops::ControlFlow;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array4, ArrayView3, Axis};
 use rayon::prelude::*;
-use stereology::exemplar::measure::{
-    BandPass, Comparison, Family, Figure, MeasureOptions, compare, grey, histogram, kl_divergence, moments,
-    orientation_field, sections,
-};
 use stereology::exemplar::{
     Domain, Exemplar, Method, Scan, SolidOptions, Views, synthesize_solid, synthesize_solid_watched,
 };
+use stereology::metrics::{
+    Comparison, Family, Figure, grey, histogram, kl_divergence, moments, orientation_field, sections,
+};
+use stereology::pipeline::{CompareOptions, compare_solid};
+use stereology::spectrum::BandPass;
 
 /// The methods by name.
 pub const METHODS: [(&str, Method); 3] = [
@@ -163,11 +164,14 @@ pub fn run(picture: &Array2<f32>, cases: &[Case]) -> Result<Vec<Outcome>> {
                     kl_orientation: kl_divergence(&here.orientation, &wanted.orientation),
                 });
             })?;
-            let options = MeasureOptions::default().with_patches(8192);
+            let options = CompareOptions {
+                patches: Some(8192),
+                ..CompareOptions::default()
+            };
             Ok(Outcome {
                 case: *case,
                 moments: found,
-                found: compare(&[column], &slices(&solid.values), &options, &go)?,
+                found: compare_solid(&[column], &slices(&solid.values), &options, &go)?,
                 slice: solid
                     .values
                     .index_axis(Axis(1), case.size / 2)

@@ -7,7 +7,6 @@ mod bench_report;
 mod exemplar_solids;
 mod figures;
 mod grown_stones;
-mod label_scores;
 mod laminar_study;
 mod particle_noise;
 mod relief_table;

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use nalgebra::{Unit, Vector3};
 use ndarray::{Array2, Array3, Array4, Axis};
+use stereology::metrics::wasserstein_sorted;
 use stereology::pyramid::{
     Exemplar, Mode, SteerablePyramid, TextureOptions, cut_band, cut_variances, synthesize_volume_with_report,
 };
@@ -149,7 +150,7 @@ impl Wanted {
                         .collect::<Result<Vec<_>, _>>()?;
                     // Every fifth coefficient will do.
                     let found = sorted(bands.iter().flat_map(|band| band.iter().step_by(5).copied()));
-                    distance.push(wasserstein(&found, wanted));
+                    distance.push(relative_distance(&found, wanted));
                     kurtosis.push((fourth(&found) - fourth(wanted)).powi(2));
                 }
             }
@@ -216,11 +217,9 @@ fn sorted(values: impl Iterator<Item = f32>) -> Vec<f32> {
 }
 
 /// Wasserstein-1 distance over the standard deviation of `wanted`; both sorted.
-fn wasserstein(found: &[f32], wanted: &[f32]) -> f64 {
-    let at = |v: &[f32], i: usize| f64::from(v[(2 * i + 1) * v.len() / 8000]);
-    let mean = (0..4000).map(|i| (at(found, i) - at(wanted, i)).abs()).sum::<f64>() / 4000.0;
+fn relative_distance(found: &[f32], wanted: &[f32]) -> f64 {
     let square = wanted.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() / wanted.len() as f64;
-    mean / square.sqrt()
+    wasserstein_sorted(found, wanted) / square.sqrt()
 }
 
 /// Kurtosis about zero.

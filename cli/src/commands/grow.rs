@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use stereology::exemplar::grow::{
     self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels,
 };
-use stereology::exemplar::measure::{Seams, seams};
 use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
+use stereology::metrics::{Seams, seams};
 use stereology::segment::read_photo;
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
 

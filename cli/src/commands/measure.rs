@@ -6,11 +6,11 @@ use clap::Args;
 use image::{Rgb, RgbImage};
 use ndarray::{Array3, Array4, ArrayView3, Axis, Ix3};
 use serde_json::{Value, json};
-use stereology::exemplar::measure::{
-    BandPass, Comparison, Family, FamilyError, Figure, MeasureOptions, compare, copying, sections, sections_inside,
-};
 use stereology::grid::{SampleType, read_npy, read_volume};
+use stereology::metrics::{Comparison, Family, FamilyError, Figure, copying, sections, sections_inside};
+use stereology::pipeline::{CompareOptions, compare_solid};
 use stereology::segment::read_photo;
+use stereology::spectrum::BandPass;
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
@@ -126,12 +126,13 @@ impl Measure {
                 format!("{} slices were measured, {left_out} left out", slices.len()),
             ));
         }
-        let mut options = MeasureOptions::default().with_seed(everywhere.seed);
-        if let Some(period) = self.period {
-            options = options.with_band(BandPass::new(period));
-        }
+        let options = CompareOptions {
+            seed: everywhere.seed,
+            band: self.period.map(BandPass::new),
+            ..CompareOptions::default()
+        };
         let step = Step::begin("measure", everywhere.quiet);
-        let found = compare(&pictures, &slices, &options, &|done| step.at(done)).or_fail()?;
+        let found = compare_solid(&pictures, &slices, &options, &|done| step.at(done)).or_fail()?;
         drop(step);
         go_on()?;
         tell(&mut answer, &found, slices.len(), &self.slices);
@@ -217,14 +218,7 @@ impl Measure {
             .slices
             .0
             .iter()
-            .flat_map(|family| {
-                let normal = match family {
-                    Family::Xz => Axis(1),
-                    Family::Yz => Axis(2),
-                    Family::Xy => Axis(0),
-                };
-                sources.axis_iter(normal)
-            })
+            .flat_map(|family| sources.axis_iter(family.normal()))
             .collect();
         let found = copying(&pictures, exemplar.dim().1, exemplar.dim().2);
         answer
@@ -268,15 +262,12 @@ fn tell(answer: &mut Answer, found: &Comparison, slices: usize, families: &Famil
         .field("slices", slices)
         .field("families", names)
         .field("threshold", f64::from(curves.threshold))
-        .field("period", curves.period)
+        .field("period", number(curves.period))
         .field("direction", number(curves.direction))
         .field("window", curves.window.to_vec())
         .field("fringes", curves.fringe_lengths[1].len())
         .field("fringes_exemplar", curves.fringe_lengths[0].len())
-        .line(format!(
-            "{slices} slices; fringes {} pixels apart",
-            significant(curves.period)
-        ));
+        .line(format!("{slices} slices; fringes {} pixels apart", said(curves.period)));
     if found.fringe_length.value.is_none() || found.fringe_length.ideal.is_none() {
         answer.warn(Warning::new(
             "no-fringes",

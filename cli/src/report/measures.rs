@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use image::RgbImage;
-use stereology::exemplar::measure::{Comparison, Figure};
+use stereology::metrics::{Comparison, Figure};
 
 use super::page::{escaped, figure_to_scale, table};
 use super::plots;
@@ -155,7 +155,7 @@ fn curves(html: &mut String, found: &Comparison) {
         curves.window[0],
         curves.fringe_lengths[0].len(),
         curves.fringe_lengths[1].len(),
-        significant(curves.period)
+        curves.period.map_or_else(|| "-".to_owned(), significant)
     );
     let porosity = format!(
         "Shares of the bright phase (above grey level {}) in squares of {} pixels.",

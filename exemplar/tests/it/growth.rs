@@ -9,7 +9,7 @@ use stereology_exemplar::grow::{
     GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, finish, grow, grow_picture,
     synthesize_by_levels,
 };
-use stereology_exemplar::measure::seams;
+use stereology_metrics::seams;
 use stereology_shape::{ClosedMesh, TriangleMesh};
 
 fn go(_: f64) -> ControlFlow<()> {

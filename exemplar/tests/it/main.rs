@@ -6,7 +6,5 @@
     reason = "what is drawn is small; what is copied is equal"
 )]
 
-mod boolean_models;
-mod comparisons;
 mod growth;
 mod synthesis;

@@ -1,8 +1,9 @@
 //! Colour categories of profiles.
 
-use rand::{RngExt, SeedableRng, seq::SliceRandom};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_imaging::lab;
+use stereology_metrics::{KruskalWallis, kruskal_wallis};
 
 use crate::conversions::single;
 use crate::ground::kmeans::{Clusters, kmeans, silhouette};
@@ -133,29 +134,8 @@ fn best_by_gap(colours: &[[f64; 3]], seed: u64) -> usize {
     MOST.min(points.len().max(1))
 }
 
-/// Kruskal and Wallis's test that profiles of all categories have the same distribution of sizes. A small p value says that size and colour go together, so that categories should be unfolded apart.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SizeByCategory {
-    /// H, which grows with the differences of mean rank.
-    pub statistic: f64,
-    /// Share of 1,999 random exchanges of categories, and the one seen, with an H at least as large.
-    pub p_value: f64,
-}
-
-/// Random exchanges of categories.
-const EXCHANGES: u32 = 1999;
-
-/// Tests whether size and colour category go together, over whole profiles; `None` if these are of fewer than two categories.
-///
-/// # Formula
-///
-/// ```text
-/// H = 12 / (n (n + 1)) Σ n_k (R̄_k − (n + 1) / 2)²        R̄_k mean rank of the sizes in category k
-/// ```
-///
-/// # References
-///
-/// Kruskal & Wallis 1952; the p value by exchange of labels, the same for the same seed.
+/// Tests whether the sizes of whole profiles differ between categories ([`kruskal_wallis`]); `None` if fewer than two categories have five whole profiles or more. A small p-value means that size and
+/// colour are associated, so that categories should be unfolded separately.
 ///
 /// # Examples
 ///
@@ -173,44 +153,12 @@ const EXCHANGES: u32 = 1999;
 /// # Ok::<(), stereology_segment::SegmentError>(())
 /// ```
 #[must_use]
-pub fn size_by_category(profiles: &[Profile], seed: u64) -> Option<SizeByCategory> {
-    let whole: Vec<&Profile> = profiles.iter().filter(|p| !p.touches_edge).collect();
-    let n = whole.len() as f64;
-    let mut categories: Vec<usize> = whole.iter().map(|p| usize::from(p.category)).collect();
-    let most = categories.iter().copied().max()?;
-    if categories.iter().all(|c| *c == most) {
-        return None;
+pub fn size_by_category(profiles: &[Profile]) -> Option<KruskalWallis> {
+    let mut groups: Vec<Vec<f64>> = Vec::new();
+    for profile in profiles.iter().filter(|p| !p.touches_edge) {
+        let category = usize::from(profile.category);
+        groups.resize_with(groups.len().max(category + 1), Vec::new);
+        groups[category].push(profile.size);
     }
-    let mut order: Vec<usize> = (0..whole.len()).collect();
-    order.sort_by(|&a, &b| whole[a].size.total_cmp(&whole[b].size));
-    let mut ranks = vec![0.0; whole.len()];
-    let same = |a: &usize, b: &usize| whole[*a].size.total_cmp(&whole[*b].size).is_eq();
-    let mut before = 0;
-    for tied in order.chunk_by(same) {
-        let rank = before as f64 + 0.5 * (tied.len() + 1) as f64;
-        tied.iter().for_each(|&i| ranks[i] = rank);
-        before += tied.len();
-    }
-    let h = |categories: &[usize]| {
-        let mut sums = vec![(0.0, 0.0); most + 1];
-        for (&category, rank) in categories.iter().zip(&ranks) {
-            sums[category].0 += rank;
-            sums[category].1 += 1.0;
-        }
-        let filled = sums.iter().filter(|s| s.1 > 0.0);
-        12.0 / (n * (n + 1.0))
-            * filled
-                .map(|(sum, count)| count * (sum / count - 0.5 * (n + 1.0)).powi(2))
-                .sum::<f64>()
-    };
-    let statistic = h(&categories);
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let as_large = (0..EXCHANGES).filter(|_| {
-        categories.shuffle(&mut rng);
-        h(&categories) >= statistic - 1e-9
-    });
-    Some(SizeByCategory {
-        statistic,
-        p_value: (1 + as_large.count()) as f64 / f64::from(1 + EXCHANGES),
-    })
+    kruskal_wallis(&groups)
 }

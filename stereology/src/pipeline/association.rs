@@ -1,28 +1,20 @@
-//! Do particles of different colours have different sizes? The Kruskal-Wallis test.
+//! Whether particles of different colours have different sizes: the Kruskal-Wallis test.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use stereology_metrics::kruskal_wallis;
 
 /// Whether sizes differ between groups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Association {
-    /// Probability that groups of one common distribution differ as much as these do.
+    /// Probability that groups of one common distribution differ as much as these do; 1 if they cannot be tested.
     pub p_value: f64,
-    /// Is it below [`SIGNIFICANT`]?
+    /// Whether the p-value is below [`SIGNIFICANT`].
     pub together: bool,
 }
 
-/// Below this p-value size and group are taken to go together.
+/// Below this p-value size and group are taken to be associated.
 pub const SIGNIFICANT: f64 = 0.01;
 
-/// Kruskal-Wallis test of `groups` of sizes; groups of fewer than five are left out, and of fewer than two groups nothing can be said (p = 1).
-///
-/// # Formula
-///
-/// ```text
-/// H = (12 / (N (N + 1)) Σ R_g² / n_g − 3 (N + 1)) / (1 − Σ (t³ − t) / (N³ − N)),   H ~ χ² with groups − 1 degrees of freedom
-/// ```
-///
-/// R_g the sum of the ranks of group g among all N sizes, ties at their mean rank, t the lengths of the runs of ties.
+/// Tests whether `groups` of sizes have the same distribution ([`kruskal_wallis`]); groups of fewer than five sizes are left out.
 ///
 /// ```
 /// use stereology::pipeline::association;
@@ -34,46 +26,7 @@ pub const SIGNIFICANT: f64 = 0.01;
 /// ```
 #[must_use]
 pub fn association(groups: &[Vec<f64>]) -> Association {
-    let groups: Vec<&Vec<f64>> = groups.iter().filter(|group| group.len() >= 5).collect();
-    let mut sizes: Vec<(f64, usize)> = groups
-        .iter()
-        .enumerate()
-        .flat_map(|(g, group)| group.iter().map(move |&size| (size, g)))
-        .collect();
-    if groups.len() < 2 {
-        return Association {
-            p_value: 1.0,
-            together: false,
-        };
-    }
-    sizes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let n = sizes.len() as f64;
-    let mut rank_sums = vec![0.0; groups.len()];
-    let mut ties = 0.0;
-    let mut start = 0;
-    for run in sizes.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
-        let length = run.len() as f64;
-        let mean_rank = start as f64 + 0.5 * (length + 1.0);
-        for &(_, group) in run {
-            rank_sums[group] += mean_rank;
-        }
-        ties += length.powi(3) - length;
-        start += run.len();
-    }
-    let spread: f64 = rank_sums
-        .iter()
-        .zip(&groups)
-        .map(|(r, group)| r * r / group.len() as f64)
-        .sum();
-    let untied = 1.0 - ties / (n.powi(3) - n);
-    if untied <= 0.0 {
-        return Association {
-            p_value: 1.0,
-            together: false,
-        };
-    }
-    let h = (12.0 / (n * (n + 1.0)) * spread - 3.0 * (n + 1.0)) / untied;
-    let p_value = ChiSquared::new((groups.len() - 1) as f64).map_or(1.0, |law| law.sf(h.max(0.0)));
+    let p_value = kruskal_wallis(groups).map_or(1.0, |test| test.p_value);
     Association {
         p_value,
         together: p_value < SIGNIFICANT,

@@ -2,7 +2,9 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "pictures are at most 1024 pixels wide")]
 
-use crate::pipeline::{MeasuredProfiles, wasserstein};
+use stereology_metrics::wasserstein;
+
+use crate::pipeline::MeasuredProfiles;
 use image::RgbImage;
 use rayon::prelude::*;
 use std::ops::ControlFlow;

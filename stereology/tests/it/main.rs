@@ -7,6 +7,7 @@
     reason = "tests: a failed step is a failed test, equal means equal"
 )]
 
+mod comparisons;
 mod files;
 mod sample;
 mod spheres;

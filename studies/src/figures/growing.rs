@@ -15,7 +15,8 @@ use rand_chacha::ChaCha8Rng;
 use stereology::exemplar::grow::{
     GrowOptions, Grown, LevelOptions, Planes, Voxels, flood_fill, grow, grow_picture, synthesize_by_levels,
 };
-use stereology::exemplar::measure::{Family, MeasureOptions, compare, seams, sections};
+use stereology::metrics::{Family, seams, sections};
+use stereology::pipeline::{CompareOptions, compare_solid};
 use stereology::render::{Camera, RenderOptions, render_mesh};
 use stereology::shape::{ClosedMesh, TriangleMesh};
 
@@ -205,12 +206,11 @@ fn table(folder: &Path, stone: &Array3<f32>) -> Result<()> {
             .iter()
             .flat_map(|f| sections(made.values.view(), *f))
             .collect();
-        let found = compare(
-            &[stone.view()],
-            &all,
-            &MeasureOptions::default().with_patches(4096),
-            &go,
-        )?;
+        let options = CompareOptions {
+            patches: Some(4096),
+            ..CompareOptions::default()
+        };
+        let found = compare_solid(&[stone.view()], &all, &options, &go)?;
         let number = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         let name = if planes == Planes::Axis { "axis" } else { "oblique" };
         writeln!(

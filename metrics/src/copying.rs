@@ -1,27 +1,27 @@
-//! What a solid uses of its exemplar, and how much of it word for word.
+//! Which texels of its exemplar a solid uses, and how long its exact copies are.
 
 use ndarray::ArrayView2;
 
-/// How the texels of an exemplar are used by pictures whose every pixel was copied from one.
+/// Use of the texels of an exemplar by images whose every pixel was copied from one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Copying {
-    /// Share of the texels that are used at all.
+    /// Fraction of the texels that are used at all.
     pub coverage: f64,
-    /// Exponential of the entropy of their use, over their number: 1 if all are used alike, 1/n if one alone.
+    /// Exponential of the entropy of their use, over their number n: 1 if all are used equally often, 1/n if only one is used.
     pub perplexity: f64,
-    /// Longest run of pixels along a row or a column that was copied as it stands in the exemplar, pixels.
+    /// Longest run of pixels along a row or a column that is an exact copy of the exemplar, pixels.
     pub longest_copy: usize,
 }
 
-/// Coverage and copying of pictures, given the source of each pixel: row × `width` + column in an exemplar of `height` × `width` texels. Sources beyond it do not count.
+/// Coverage and copying of images, given the source of each pixel: row × `width` + column in an exemplar of `height` × `width` texels. Larger numbers do not count.
 ///
 /// # Examples
 ///
-/// A picture that is its exemplar uses every texel once, and copies whole rows:
+/// An image that equals its exemplar uses every texel once and copies whole rows:
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::copying;
+/// use stereology_metrics::copying;
 ///
 /// let itself = Array2::from_shape_fn((4, 6), |(y, x)| (6 * y + x) as u32);
 /// let found = copying(&[itself.view()], 4, 6);
@@ -29,22 +29,22 @@ pub struct Copying {
 /// assert!((found.perplexity - 1.0).abs() < 1e-12);
 /// ```
 #[must_use]
-pub fn copying(pictures: &[ArrayView2<'_, u32>], height: usize, width: usize) -> Copying {
+pub fn copying(images: &[ArrayView2<'_, u32>], height: usize, width: usize) -> Copying {
     let texels = height * width;
     let mut counts = vec![0_u64; texels];
     let mut longest = 0;
-    for picture in pictures {
-        for &source in *picture {
+    for image in images {
+        for &source in *image {
             if let Some(count) = counts.get_mut(source as usize) {
                 *count += 1;
             }
         }
-        for line in picture.rows() {
+        for line in image.rows() {
             longest = longest.max(longest_run(line.iter().copied(), texels, |a, b| {
                 b == a + 1 && b % width != 0
             }));
         }
-        for line in picture.columns() {
+        for line in image.columns() {
             longest = longest.max(longest_run(line.iter().copied(), texels, |a, b| b == a + width));
         }
     }
@@ -81,9 +81,9 @@ mod tests {
     use super::copying;
     use ndarray::Array2;
 
-    /// Copies end at the exemplar's right border, though the numbers go on; one texel alone has perplexity 1/n.
+    /// A copy ends at the exemplar's right border, although the next number follows there; a single texel has perplexity 1/n.
     #[test]
-    fn rows_do_not_run_over_the_border() {
+    fn rows_end_at_the_border() {
         let over = Array2::from_shape_fn((1, 6), |(_, x)| [0, 1, 2, 3, 4, 5][x]);
         assert_eq!(copying(&[over.view()], 4, 3).longest_copy, 3);
         let one = Array2::from_elem((5, 5), 7);

@@ -1,4 +1,4 @@
-//! The pictures a volume shows on planes normal to its axes.
+//! The slices of a volume on planes normal to its axes.
 
 use ndarray::{ArrayView3, ArrayView4, Axis};
 use std::fmt::{self, Display};
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// Parallel planes through a volume, named by the axes that lie in them.
 ///
-/// Rows of a picture run along z and columns along x or y, so that layers which lie flat in the volume are horizontal on it; on `Xy` rows run along y, columns along x.
+/// Rows of a slice run along z and columns along x or y, so that flat layers of the volume are horizontal in it; on `Xy` rows run along y and columns along x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Constant y: rows along z, columns along x.
@@ -22,7 +22,8 @@ impl Family {
     pub const ALL: [Self; 3] = [Self::Xz, Self::Yz, Self::Xy];
 
     /// The axis of a volume (z, y, x) that the planes are normal to.
-    pub(super) fn normal(self) -> Axis {
+    #[must_use]
+    pub fn normal(self) -> Axis {
         match self {
             Self::Xz => Axis(1),
             Self::Yz => Axis(2),
@@ -41,7 +42,7 @@ impl Display for Family {
     }
 }
 
-/// A name that is no family of planes.
+/// A name that is not a family of planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("slices are xz, yz or xy")]
 pub struct FamilyError;
@@ -59,19 +60,19 @@ impl FromStr for Family {
     }
 }
 
-/// All pictures (row, column, channel) of one family of a volume (z, y, x, channel), without copying.
+/// All slices (row, column, channel) of one family of a volume (z, y, x, channel), without copying.
 ///
 /// # Examples
 ///
 /// ```
 /// use ndarray::Array4;
-/// use stereology_exemplar::measure::{Family, sections};
+/// use stereology_metrics::{Family, sections};
 ///
 /// let volume = Array4::<f32>::zeros((2, 3, 4, 1));
-/// let shown = |family| { let all = sections(volume.view(), family); (all.len(), all[0].dim()) };
-/// assert_eq!(shown(Family::Xz), (3, (2, 4, 1)));
-/// assert_eq!(shown(Family::Yz), (4, (2, 3, 1)));
-/// assert_eq!(shown(Family::Xy), (2, (3, 4, 1)));
+/// let slices = |family| { let all = sections(volume.view(), family); (all.len(), all[0].dim()) };
+/// assert_eq!(slices(Family::Xz), (3, (2, 4, 1)));
+/// assert_eq!(slices(Family::Yz), (4, (2, 3, 1)));
+/// assert_eq!(slices(Family::Xy), (2, (3, 4, 1)));
 /// ```
 #[must_use]
 pub fn sections(volume: ArrayView4<'_, f32>, family: Family) -> Vec<ArrayView3<'_, f32>> {

@@ -4,7 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array3;
 use std::ops::ControlFlow;
-use stereology_exemplar::measure::{MeasureOptions, compare};
+use stereology_metrics::{MeasureOptions, compare};
 
 fn bench(criterion: &mut Criterion) {
     let picture = |k: usize| {
@@ -14,9 +14,9 @@ fn bench(criterion: &mut Criterion) {
     };
     let slices: Vec<Array3<f32>> = (0..32).map(picture).collect();
     let views: Vec<_> = slices.iter().map(|s| s.view()).collect();
-    let options = MeasureOptions::default().with_patches(2048);
+    let options = MeasureOptions::new(0.5).with_patches(2048);
     criterion.bench_function("compare/32 slices of 128²", |bencher| {
-        bencher.iter(|| compare(&views[..1], &views, &options, &|_| ControlFlow::Continue(())));
+        bencher.iter(|| compare(&views[..1], &views, None, &options, &|_| ControlFlow::Continue(())));
     });
 }
 

@@ -1,10 +1,10 @@
-//! Local porosity: how a phase's share varies from place to place.
+//! Local porosity: how a phase's fraction varies from place to place.
 
 use ndarray::{Array2, ArrayView2};
 
-/// Shares of the phase in all squares of `side` pixels, by the place of their first corner; empty if none fits.
+/// Fractions of the phase in all squares of `side` pixels, by the place of their first corner; empty if no square fits.
 ///
-/// Their mean over a large picture is the phase's share φ, their variance falls from φ (1 − φ) (side 1) with the side: the slower, the coarser the material.
+/// Over a large image their mean is the phase's fraction φ, and their variance falls from φ (1 − φ) at side 1 as the side grows; it falls more slowly in a coarser material.
 ///
 /// # References
 ///
@@ -12,10 +12,10 @@ use ndarray::{Array2, ArrayView2};
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::local_porosity;
+/// use stereology_metrics::local_porosity;
 ///
 /// let board = Array2::from_shape_fn((10, 12), |(y, x)| (x + y) % 2 == 0);
-/// assert!(local_porosity(board.view(), 4).iter().all(|share| *share == 0.5));
+/// assert!(local_porosity(board.view(), 4).iter().all(|fraction| *fraction == 0.5));
 /// ```
 #[must_use]
 pub fn local_porosity(phase: ArrayView2<'_, bool>, side: usize) -> Array2<f64> {

@@ -1,19 +1,26 @@
-//! Comparisons of pictures that differ in a known way.
+//! Comparisons of images that differ in a known way.
 
 use ndarray::{Array3, ArrayView3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
-use stereology_exemplar::measure::{Comparison, MeasureError, MeasureOptions, Patches, compare, sliced_wasserstein};
+use stereology::metrics::{Comparison, MeasureError, Patches, sliced_wasserstein};
+use stereology::pipeline::{CompareOptions, compare_solid};
 
 fn go(_: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
+fn with_patches(patches: usize) -> CompareOptions {
+    CompareOptions {
+        patches: Some(patches),
+        ..CompareOptions::default()
+    }
+}
+
 fn compared(exemplar: &Array3<f32>, solid: &Array3<f32>) -> Comparison {
-    let options = MeasureOptions::default().with_patches(2000);
-    compare(&[exemplar.view()], &[solid.view()], &options, &go).unwrap()
+    compare_solid(&[exemplar.view()], &[solid.view()], &with_patches(2000), &go).unwrap()
 }
 
 /// Smoothed noise about .5.
@@ -26,9 +33,9 @@ fn texture(height: usize, width: usize, seed: u64) -> Array3<f32> {
     })
 }
 
-/// The exemplar itself: nothing differs but the draw of patches.
+/// The exemplar compared with itself: only the random patches differ.
 #[test]
-fn a_picture_is_its_own_best_solid() {
+fn an_image_equals_itself() {
     let picture = texture(96, 96, 1);
     let found = compared(&picture, &picture);
     for (name, figure) in found.figures() {
@@ -42,9 +49,9 @@ fn a_picture_is_its_own_best_solid() {
     }
 }
 
-/// Another picture of the same material is as near as the floors; less contrast, blur and another direction are told by the figure meant for them.
+/// The figures of another image of the same material are within the floors; less contrast and another direction change the figure that measures them.
 #[test]
-fn each_figure_tells_its_fault() {
+fn each_figure_shows_its_fault() {
     let (exemplar, other) = (texture(128, 128, 1), texture(128, 128, 2));
     let same = compared(&exemplar, &other);
     assert!(
@@ -61,9 +68,9 @@ fn each_figure_tells_its_fault() {
     assert!(striped.kl_orientation.in_floors().unwrap() > 3.0 && striped.swd16.in_floors().unwrap() > 1.5);
 }
 
-/// Fringes with more dislocations are shorter; wavy ones wind.
+/// Fringes with more dislocations are shorter; wavy ones have a larger tortuosity.
 #[test]
-fn fringes_are_told_apart() {
+fn fringes_are_distinguished() {
     let fringes = |dislocations: usize, wave: f64| {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let ends: Vec<[f64; 3]> = (0..dislocations)
@@ -82,7 +89,7 @@ fn fringes_are_told_apart() {
         })
     };
     let found = compared(&fringes(12, 0.0), &fringes(40, 0.0));
-    assert!((found.curves.period - 8.0).abs() < 1.0 && found.curves.direction.is_some());
+    assert!((found.curves.period.unwrap() - 8.0).abs() < 1.0 && found.curves.direction.is_some());
     let by_ends = found.fringe_length_by_ends;
     assert!(
         by_ends.value.unwrap() < 0.6 * by_ends.ideal.unwrap(),
@@ -93,7 +100,7 @@ fn fringes_are_told_apart() {
     assert!(wavy.value.unwrap() > wavy.ideal.unwrap() + 0.01, "{wavy:?}");
 }
 
-/// A shift of all grey levels by c moves the mean of d-dimensional patches by c √d along the diagonal; a random direction sees c √d |u₁|, whose mean is known.
+/// A shift of all grey levels by c moves d-dimensional patches by c √d along the diagonal; projected on a random direction this is c √d |u₁|, whose mean is known.
 #[test]
 fn sliced_wasserstein_of_a_shift() {
     let picture = texture(80, 80, 3);
@@ -105,14 +112,14 @@ fn sliced_wasserstein_of_a_shift() {
     let half_integer: f64 = (1..=12).map(|k| f64::from(k) - 0.5).product::<f64>() * PI.sqrt();
     let whole: f64 = (1..=12).map(f64::from).product();
     let law = 0.2 * 5.0 * half_integer / (PI.sqrt() * whole);
-    // The spread of |u1| is .76 of its mean; five standard errors.
+    // The standard deviation of |u1| is .76 of its mean; five standard errors.
     assert!(
         (found / law - 1.0).abs() < 5.0 * 0.76 / (projections as f64).sqrt(),
         "{found}, law {law}"
     );
 }
 
-/// White noise of two contrasts: every direction sees two normal distributions of spreads s and t, |s − t| √(2/π) apart.
+/// White noise of two contrasts: on every direction it projects to normal distributions of standard deviations s and t, whose distance is |s − t| √(2/π).
 #[test]
 fn sliced_wasserstein_of_two_contrasts() {
     let noise = |spread: f32, seed: u64| {
@@ -127,12 +134,12 @@ fn sliced_wasserstein_of_two_contrasts() {
     assert!((found / (0.1 * (2.0 / PI).sqrt()) - 1.0).abs() < 0.03, "{found}");
 }
 
-/// What cannot be compared is said, not computed.
+/// Images that cannot be compared are refused.
 #[test]
-fn what_cannot_be_compared_is_refused() {
+fn images_that_cannot_be_compared_are_refused() {
     let good = texture(32, 32, 1);
     let refused = |exemplar: &[ArrayView3<'_, f32>], slices: &[ArrayView3<'_, f32>]| {
-        compare(exemplar, slices, &MeasureOptions::default().with_patches(10), &go).unwrap_err()
+        compare_solid(exemplar, slices, &with_patches(10), &go).unwrap_err()
     };
     assert!(matches!(
         refused(&[], &[good.view()]),
@@ -155,13 +162,12 @@ fn what_cannot_be_compared_is_refused() {
         refused(&[good.view()], &[holed.view()]),
         MeasureError::NotFinite { side: "volume" }
     );
-    let stopped = compare(&[good.view()], &[good.view()], &MeasureOptions::default(), &|_| {
+    let stopped = compare_solid(&[good.view()], &[good.view()], &CompareOptions::default(), &|_| {
         ControlFlow::Break(())
     });
     assert_eq!(stopped.unwrap_err(), MeasureError::Cancelled);
-    // Slices too small for patches of 16 are measured without them.
+    // Slices that are too small for patches of 16 pixels are measured without them.
     let thin = texture(10, 40, 2);
-    let options = MeasureOptions::default().with_patches(100);
-    let found = compare(&[good.view()], &[thin.view()], &options, &go).unwrap();
+    let found = compare_solid(&[good.view()], &[thin.view()], &with_patches(100), &go).unwrap();
     assert!(found.swd16.value.is_none() && found.swd7.value.is_some());
 }

@@ -2,16 +2,16 @@
 
 use ndarray::Array2;
 
-/// A curve along which a field has one value; points are (x, y) in pixels, sample (row, column) at (column, row).
+/// A curve along which a field has one value. Points are (x, y) in pixels; the sample (row, column) lies at (column, row).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelCurve {
     /// Its points in order; the first is not repeated at the end of a closed curve.
     pub points: Vec<[f64; 2]>,
-    /// Whether it closes; an open curve begins and ends on the field's border.
+    /// Whether the curve is closed; an open curve begins and ends on the field's border.
     pub closed: bool,
 }
 
-/// The curves on which the field is `level`, in a fixed order. Where a square's corners alternate, the mean of the four decides which are joined. Cost: linear.
+/// The curves on which the field has the value `level`, in a fixed order. Where the corners of a square alternate, their mean decides which are joined. Cost: linear.
 ///
 /// # Examples
 ///
@@ -19,7 +19,7 @@ pub struct LevelCurve {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::level_curves;
+/// use stereology_metrics::level_curves;
 ///
 /// let cone = Array2::from_shape_fn((41, 41), |(y, x)| (y as f64 - 20.0).hypot(x as f64 - 20.0) - 15.0);
 /// let curves = level_curves(&cone, 0.0);
@@ -63,7 +63,7 @@ pub fn level_curves(field: &Array2<f64>, level: f64) -> Vec<LevelCurve> {
                 [a, b] => link(a, b),
                 [_, _, _, _] => {
                     let mean = (field[[y, x]] + field[[y, x + 1]] + field[[y + 1, x]] + field[[y + 1, x + 1]]) / 4.0;
-                    // The middle belongs to the two corners on its side of the level: the curves cut the other two off.
+                    // The middle is connected with the two corners on its side of the level; the curves separate the other two.
                     if corners[0] == (mean > level) {
                         link(top, right);
                         link(bottom, left);
@@ -89,7 +89,7 @@ pub fn level_curves(field: &Array2<f64>, level: f64) -> Vec<LevelCurve> {
     };
     let mut seen = vec![false; links.len()];
     let mut curves = Vec::new();
-    // First the open curves, from the border; what is left is closed.
+    // First the open curves, from the border; the remaining ones are closed.
     for open in [true, false] {
         for start in 0..links.len() {
             let ends = links[start].iter().filter(|&&l| l == NONE).count();
@@ -112,7 +112,7 @@ pub fn level_curves(field: &Array2<f64>, level: f64) -> Vec<LevelCurve> {
 }
 
 impl LevelCurve {
-    /// Length, pixels; of a closed curve all around.
+    /// Length, pixels; for a closed curve its whole circumference.
     #[must_use]
     pub fn length(&self) -> f64 {
         let along: f64 = self.points.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
@@ -122,11 +122,11 @@ impl LevelCurve {
         }
     }
 
-    /// Length over the distance from end to end: a straight line has 1, a half circle π/2. `None` for closed curves.
+    /// Length over the distance from end to end: 1 for a straight line, π/2 for a half circle. `None` for closed curves.
     ///
     /// ```
     /// use std::f64::consts::PI;
-    /// use stereology_exemplar::measure::LevelCurve;
+    /// use stereology_metrics::LevelCurve;
     ///
     /// let half_circle = (0..=1000).map(|i| (f64::from(i) * PI / 1000.0).sin_cos()).map(|(s, c)| [c, s]);
     /// let curve = LevelCurve { points: half_circle.collect(), closed: false };
@@ -152,7 +152,7 @@ mod tests {
     use super::level_curves;
     use ndarray::{Array2, array};
 
-    /// A plane's level curve is one straight line from border to border, exact by linear interpolation.
+    /// The level curve of a plane is one straight line from border to border, since linear interpolation is exact.
     #[test]
     fn a_plane_gives_a_straight_line() {
         let plane = Array2::from_shape_fn((20, 30), |(y, x)| 0.31 * x as f64 - 0.57 * y as f64 - 1.234);
@@ -164,13 +164,13 @@ mod tests {
         }
     }
 
-    /// At a saddle the mean decides, and the two curves never cross.
+    /// At a saddle the mean decides which corners are joined, and the two curves do not cross.
     #[test]
-    fn a_saddle_is_decided_by_its_mean() {
+    fn the_mean_decides_a_saddle() {
         for (low, ends) in [(0.9, [0.0, 1.0]), (3.0, [0.0, 1.0])] {
             let curves = level_curves(&array![[1.0, -low], [-low, 1.0]], 0.0);
             assert_eq!((curves.len(), ends), (2, [0.0, 1.0]));
-            // High mean: the low corners are cut off; low mean: the high ones.
+            // A high mean separates the low corners, a low mean the high ones.
             let corner = if low < 1.0 { [1.0, 0.0] } else { [0.0, 0.0] };
             let near = curves
                 .iter()

@@ -1,10 +1,13 @@
-//! The filter that shows lattice fringes alone: one period, one direction.
+//! A band-pass filter of images for one period and one direction, such as that of lattice fringes.
 
 use ndarray::Array2;
 use std::f64::consts::PI;
-use stereology_spectrum::{RealFft, SpectrumError, frequency, periodic_component};
 
-/// A band of frequencies about one period, of all directions or about one.
+use crate::error::SpectrumError;
+use crate::periodic::periodic_component;
+use crate::transform::{RealFft, frequency};
+
+/// A band of frequencies about one period, for all directions or about one direction.
 ///
 /// # Formula
 ///
@@ -17,11 +20,11 @@ use stereology_spectrum::{RealFft, SpectrumError, frequency, periodic_component}
 /// Urs et al. 2012, section 3 (the filtered versions of figure 5), after Da Costa et al.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandPass {
-    /// Distance from fringe to fringe, pixels.
+    /// Period: distance between neighbouring fringes, pixels.
     pub period: f64,
-    /// Width of the radial bell, in natural logarithms of frequency.
+    /// Standard deviation of the radial gain, in natural logarithms of frequency.
     pub width: f64,
-    /// Direction along the fringes (0 to π from the columns' axis) and the spread about it, radians; `None` takes all directions.
+    /// Direction along the fringes (0 to π from the columns' axis) and the standard deviation about it, radians; `None` for all directions.
     pub direction: Option<(f64, f64)>,
 }
 
@@ -36,7 +39,7 @@ impl BandPass {
         }
     }
 
-    /// Only fringes along `angle`, spread by `spread`, radians.
+    /// Only fringes along `angle`, with the standard deviation `spread`, radians.
     #[must_use]
     pub fn with_direction(self, angle: f64, spread: f64) -> Self {
         Self {
@@ -45,17 +48,17 @@ impl BandPass {
         }
     }
 
-    /// The band in which a picture has most power per octave, from 3 pixels to a sixth of its side; with a direction (spread 20 degrees) if most of that power lies about one.
+    /// The band in which an image has most power per octave, from 3 pixels to a sixth of its side; with a direction (standard deviation 20 degrees) if most of that power lies about one direction.
     ///
     /// # Errors
     ///
-    /// [`SpectrumError`] for a picture with values that are not finite, or none.
+    /// [`SpectrumError`] for an image with values that are not finite, or without pixels.
     ///
     /// # Examples
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use stereology_exemplar::measure::BandPass;
+    /// use stereology_spectrum::BandPass;
     ///
     /// let fringes = Array2::from_shape_fn((96, 96), |(y, _)| (y as f64 * std::f64::consts::TAU / 8.0).cos());
     /// let band = BandPass::of(&fringes)?;
@@ -69,11 +72,11 @@ impl BandPass {
         clippy::cast_sign_loss,
         reason = "clamped to the bins"
     )]
-    pub fn of(picture: &Array2<f64>) -> Result<Self, SpectrumError> {
-        let (height, width) = picture.dim();
-        let spectrum = RealFft::<f64>::new(&[height, width])?.forward(periodic_component(picture.view())?.view())?;
+    pub fn of(image: &Array2<f64>) -> Result<Self, SpectrumError> {
+        let (height, width) = image.dim();
+        let spectrum = RealFft::<f64>::new(&[height, width])?.forward(periodic_component(image.view())?.view())?;
         let longest = (height.min(width) as f64 / 6.0).max(6.0);
-        // Bins of a quarter octave; power in a bin of equal ratios is power per octave.
+        // Bins of a quarter octave: bins of one ratio, so their power is proportional to the power per octave.
         let bin_of = |period: f64| 4.0 * (period / 3.0).log2();
         let bins = bin_of(longest).ceil() as usize + 1;
         let mut sums = vec![[0.0; 4]; bins];
@@ -94,7 +97,7 @@ impl BandPass {
             ];
             bin.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
         }
-        // Neighbouring bins together: a peak may lie on an edge.
+        // Neighbouring bins are added, since a peak may lie on an edge.
         let around =
             |i: usize, k: usize| -> f64 { sums[i.saturating_sub(1)..(i + 2).min(bins)].iter().map(|b| b[k]).sum() };
         let best = (0..bins)
@@ -106,7 +109,7 @@ impl BandPass {
         }
         let band = Self::new((-around(best, 1) / power).exp());
         let (c, s) = (around(best, 2) / power, around(best, 3) / power);
-        // The length of the mean doubled direction: 1 for one direction, 0 for all alike.
+        // The length of the mean vector of doubled directions: 1 for one direction, 0 if all directions are equally strong.
         Ok(if c.hypot(s) > 0.5 {
             let normal = 0.5 * s.atan2(c);
             band.with_direction((normal + PI / 2.0).rem_euclid(PI), 20_f64.to_radians())
@@ -115,10 +118,10 @@ impl BandPass {
         })
     }
 
-    /// Gain at a frequency, cycles per pixel along columns' axis x and rows' axis y.
+    /// Gain at a frequency, in cycles per pixel along x (the columns' axis) and y.
     ///
     /// ```
-    /// use stereology_exemplar::measure::BandPass;
+    /// use stereology_spectrum::BandPass;
     ///
     /// let band = BandPass::new(8.0);
     /// assert_eq!((band.gain(0.125, 0.0), band.gain(0.0, 0.0)), (1.0, 0.0));
@@ -135,31 +138,31 @@ impl BandPass {
         let radial = bell((f * self.period).ln(), self.width);
         self.direction.map_or(radial, |(angle, spread)| {
             let normal = angle + PI / 2.0;
-            let apart = (fy.atan2(fx) - normal + PI / 2.0).rem_euclid(PI) - PI / 2.0;
-            radial * bell(apart, spread)
+            let difference = (fy.atan2(fx) - normal + PI / 2.0).rem_euclid(PI) - PI / 2.0;
+            radial * bell(difference, spread)
         })
     }
 
-    /// The picture's fringes alone, about zero. The picture's periodic component is filtered, so that opposite borders that do not fit leave no trace.
+    /// The image reduced to the band, with values about zero. The image's periodic component is filtered, so that jumps between opposite borders leave no trace.
     ///
     /// # Errors
     ///
-    /// [`SpectrumError`] for a picture with values that are not finite, or none.
+    /// [`SpectrumError`] for an image with values that are not finite, or without pixels.
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use stereology_exemplar::measure::BandPass;
+    /// use stereology_spectrum::BandPass;
     ///
     /// let wave = |period: f64| Array2::from_shape_fn((64, 64), move |(y, _)| (y as f64 * std::f64::consts::TAU / period).sin());
     /// let filtered = BandPass::new(8.0).filter(&(&wave(8.0) + &wave(32.0) + 0.5))?;
-    /// let off = (&filtered - &wave(8.0)).mapv(|v| v * v).mean().unwrap().sqrt();
-    /// assert!(off < 0.1); // the long wave and the mean are gone
+    /// let error = (&filtered - &wave(8.0)).mapv(|v| v * v).mean().unwrap().sqrt();
+    /// assert!(error < 0.1); // the long wave and the mean are gone
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn filter(&self, picture: &Array2<f64>) -> Result<Array2<f64>, SpectrumError> {
-        let (height, width) = picture.dim();
+    pub fn filter(&self, image: &Array2<f64>) -> Result<Array2<f64>, SpectrumError> {
+        let (height, width) = image.dim();
         let fft = RealFft::<f64>::new(&[height, width])?;
-        let mut spectrum = fft.forward(periodic_component(picture.view())?.view())?;
+        let mut spectrum = fft.forward(periodic_component(image.view())?.view())?;
         for ((ky, kx), value) in spectrum.indexed_iter_mut() {
             *value = value.scale(self.gain(frequency(kx, width), frequency(ky, height)));
         }

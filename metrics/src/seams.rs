@@ -1,4 +1,4 @@
-//! Seams: how a solid that was grown from several places looks where the pieces meet.
+//! Seams: the steps of a solid between the cells that were grown from different seeds.
 
 use ndarray::{ArrayView3, ArrayView4};
 
@@ -14,20 +14,20 @@ pub struct Seams {
 }
 
 impl Seams {
-    /// Steps across borders over steps inside: 1 where no seam can be told by it. `None` without borders or without texture.
+    /// Steps across borders over steps inside: 1 if the borders show no seam. `None` without borders or without texture.
     #[must_use]
     pub fn visibility(&self) -> Option<f64> {
         (self.pairs > 0 && self.inside > 0.0).then(|| self.across / self.inside)
     }
 }
 
-/// Steps of a volume (z, y, x, channel) between neighbours along the axes, by whether they lie in one cell; label 0 is outside and does not count.
+/// Mean steps of a volume (z, y, x, channel) between neighbours along the axes, within cells and across their borders; label 0 is outside and does not count.
 ///
 /// # Examples
 ///
 /// ```
 /// use ndarray::{Array3, Array4};
-/// use stereology_exemplar::measure::seams;
+/// use stereology_metrics::seams;
 ///
 /// let labels = Array3::from_shape_fn((4, 4, 8), |(_, _, x)| 1 + u32::from(x >= 4));
 /// let volume = Array4::from_shape_fn((4, 4, 8, 1), |(z, _, x, _)| 0.1 * (z % 2) as f32 + if x < 4 { 0.0 } else { 0.5 });

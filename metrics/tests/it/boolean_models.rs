@@ -4,11 +4,11 @@ use ndarray::{Array2, Array3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
-use stereology_exemplar::measure::{chord_lengths, lineal_path, local_porosity, radial_mean, two_point};
+use stereology_metrics::{chord_lengths, lineal_path, local_porosity, radial_mean, two_point};
 
 /// Number of points of a Poisson process of mean `mean`.
 fn poisson(rng: &mut ChaCha8Rng, mean: f64) -> usize {
-    // Gaps of exponential length; the means here are hundreds.
+    // Exponential gaps; the means here are hundreds.
     let (mut at, mut count) = (0.0, 0);
     loop {
         at -= (1.0 - rng.random::<f64>()).ln();
@@ -19,7 +19,7 @@ fn poisson(rng: &mut ChaCha8Rng, mean: f64) -> usize {
     }
 }
 
-/// True outside discs of radius `radius`, `density` a unit of area; discs whose centres lie beyond the borders reach in.
+/// True outside discs of radius `radius`, `density` per unit of area; discs whose centres lie outside the image overlap it too.
 fn outside_discs(side: usize, radius: f64, density: f64, seed: u64) -> Array2<bool> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let wide = side as f64 + 2.0 * radius;
@@ -50,7 +50,7 @@ fn union_of_discs(r: f64, d: f64) -> f64 {
     2.0 * PI * r * r - common
 }
 
-/// Means and standard errors of curves over independent pictures.
+/// Means and standard errors of curves over independent images.
 fn averaged(curves: &[Vec<f64>]) -> Vec<(f64, f64)> {
     let n = curves.len() as f64;
     (0..curves[0].len())
@@ -64,25 +64,25 @@ fn averaged(curves: &[Vec<f64>]) -> Vec<(f64, f64)> {
 
 const RADIUS: f64 = 6.0;
 const DENSITY: f64 = 0.005;
-const PICTURES: u64 = 60;
+const IMAGES: u64 = 60;
 
-fn pictures() -> Vec<Array2<bool>> {
-    (0..PICTURES)
+fn images() -> Vec<Array2<bool>> {
+    (0..IMAGES)
         .map(|seed| outside_discs(160, RADIUS, DENSITY, seed))
         .collect()
 }
 
-/// Student's t of 59 degrees of freedom exceeds 6.4 once in a million twice-sided tests of the 30 lags here.
+/// Student's t with 59 degrees of freedom exceeds 6.4 in one of a million two-sided tests of the 30 lags.
 const T: f64 = 6.4;
 
 /// Two points are outside all discs if no centre lies in the union of the discs about them.
 #[test]
 fn two_point_correlation_of_overlapping_discs() {
     let of = |phase: &Array2<bool>| {
-        let map = two_point(phase.mapv(|p| f64::from(u8::from(p))).view(), 30).unwrap();
+        let map = two_point(phase.view(), 30);
         map.row(30).iter().skip(30).copied().collect::<Vec<f64>>()
     };
-    let curves: Vec<Vec<f64>> = pictures().iter().map(of).collect();
+    let curves: Vec<Vec<f64>> = images().iter().map(of).collect();
     for (lag, (mean, error)) in averaged(&curves).iter().enumerate() {
         let law = (-DENSITY * union_of_discs(RADIUS, lag as f64)).exp();
         assert!(
@@ -92,14 +92,14 @@ fn two_point_correlation_of_overlapping_discs() {
     }
 }
 
-/// A segment is outside all discs if no centre lies within a radius of it; chords are exponential.
+/// A segment is outside all discs if no centre lies within a radius of it; chord lengths are exponential.
 #[test]
 fn lineal_path_and_chords_of_overlapping_discs() {
-    let all = pictures();
+    let all = images();
     for axis in [Axis(0), Axis(1)] {
         let curves: Vec<Vec<f64>> = all.iter().map(|p| lineal_path(p.view(), axis, 30)).collect();
         for (z, (mean, error)) in averaged(&curves).iter().enumerate() {
-            // A path of z pixels is seen at z + 1 points only; between them a disc may just reach across the line.
+            // A path of z pixels is sampled at z + 1 points only; a disc may cross the line between them.
             let law = (-DENSITY * (PI * RADIUS * RADIUS + 2.0 * RADIUS * z as f64)).exp();
             let missed = law * DENSITY * z as f64 * RADIUS * 0.02;
             assert!(
@@ -108,19 +108,19 @@ fn lineal_path_and_chords_of_overlapping_discs() {
             );
         }
     }
-    // Chords of exponential length c, seen by whole pixels where they are short beside the picture: mean of those over m pixels is m + 1/c.
+    // Exponential chord lengths of rate c, in whole pixels, short compared with the image: the mean of those over m pixels is m + 1/c.
     let c = 2.0 * RADIUS * DENSITY;
     let means: Vec<Vec<f64>> = all
         .iter()
         .map(|p| {
             let chords = chord_lengths(p.view(), Axis(1));
-            // Of the chords up to 40 pixels, the share up to 20: free of the border's choice, nearly.
+            // The fraction up to 20 pixels of the chords up to 40, which hardly depends on the border.
             let count = |most: usize| chords.iter().filter(|&&l| l <= most).count() as f64;
             vec![count(20) / count(40)]
         })
         .collect();
-    let (share, error) = averaged(&means)[0];
-    // A chord of l pixels is left out if it touches the border: weight (160 − l).
+    let (fraction, error) = averaged(&means)[0];
+    // A chord of l pixels that touches the border is left out: weight (160 − l).
     let weight = |a: f64, b: f64| {
         (0..1000)
             .map(|i| a + (f64::from(i) + 0.5) * (b - a) / 1000.0)
@@ -128,10 +128,13 @@ fn lineal_path_and_chords_of_overlapping_discs() {
             .sum::<f64>()
     };
     let law = weight(0.5, 20.5) / weight(0.5, 40.5);
-    assert!((share - law).abs() < T * error + 0.003, "{share} +- {error}, law {law}");
+    assert!(
+        (fraction - law).abs() < T * error + 0.003,
+        "{fraction} +- {error}, law {law}"
+    );
 }
 
-/// Sections of overlapping spheres: S2 of the void phase, the sphere law.
+/// Sections of overlapping spheres: S2 of the void phase follows the law of the spheres.
 #[test]
 fn two_point_correlation_of_overlapping_spheres() {
     let (radius, density, side) = (5.0, 0.0012, 48_usize);
@@ -139,7 +142,7 @@ fn two_point_correlation_of_overlapping_spheres() {
     let of = |seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let wide = side as f64 + 2.0 * radius;
-        let mut void = Array3::from_elem((side, side, side), 1.0_f64);
+        let mut void = Array3::from_elem((side, side, side), true);
         for _ in 0..poisson(&mut rng, density * wide.powi(3)) {
             let c = [0; 3].map(|_| rng.random::<f64>() * wide - radius);
             let range = |c: f64| {
@@ -150,15 +153,15 @@ fn two_point_correlation_of_overlapping_spheres() {
                     for x in range(c[2]) {
                         let square = (z as f64 - c[0]).powi(2) + (y as f64 - c[1]).powi(2) + (x as f64 - c[2]).powi(2);
                         if square < radius * radius {
-                            void[[z, y, x]] = 0.0;
+                            void[[z, y, x]] = false;
                         }
                     }
                 }
             }
         }
-        // The whole volume, and one of its sections: the same function.
-        let volume = two_point(void.view(), 14).unwrap();
-        let section = two_point(void.index_axis(Axis(1), 24), 14).unwrap();
+        // The volume and one of its sections have the same function.
+        let volume = two_point(void.view(), 14);
+        let section = two_point(void.index_axis(Axis(1), 24), 14);
         let line = |d: usize| volume[[14, 14, 14 + d]];
         (0..15)
             .map(line)
@@ -178,22 +181,22 @@ fn two_point_correlation_of_overlapping_spheres() {
     }
 }
 
-/// Squares of independent pixels hold a binomial number: variance φ (1 − φ) / side².
+/// Squares of independent pixels contain a binomial number: variance φ (1 − φ) / side².
 #[test]
 fn local_porosity_of_noise_is_binomial() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let noise = Array2::from_shape_fn((512, 512), |_| rng.random::<f64>() < 0.3);
     for side in [1_usize, 4, 8] {
-        let shares = local_porosity(noise.view(), side);
-        // Squares side by side are independent.
-        let apart: Vec<f64> = shares
+        let fractions = local_porosity(noise.view(), side);
+        // Disjoint squares are independent.
+        let disjoint: Vec<f64> = fractions
             .indexed_iter()
             .filter(|((y, x), _)| y % side == 0 && x % side == 0)
             .map(|(_, s)| *s)
             .collect();
-        let n = apart.len() as f64;
-        let mean = apart.iter().sum::<f64>() / n;
-        let variance = apart.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
+        let n = disjoint.len() as f64;
+        let mean = disjoint.iter().sum::<f64>() / n;
+        let variance = disjoint.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
         let law = 0.21 / (side * side) as f64;
         // Variance of a variance: about 2 σ⁴ / n; five standard errors.
         assert!(
@@ -204,18 +207,18 @@ fn local_porosity_of_noise_is_binomial() {
     }
 }
 
-/// Independent pixels: S2 is φ at 0 and φ² beyond, and its rings say so.
+/// S2 of independent pixels is φ at displacement 0 and φ² elsewhere, and so are its radial means.
 #[test]
 fn two_point_correlation_of_noise() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let noise = Array2::from_shape_fn((300, 400), |_| f64::from(u8::from(rng.random::<f64>() < 0.4)));
-    let share = noise.mean().unwrap();
-    let rings = radial_mean(two_point(noise.view(), 20).unwrap().view());
-    assert!((rings[0] - share).abs() < 1e-9);
-    // A ring averages some hundred lags of 120,000 pairs each.
+    let noise = Array2::from_shape_fn((300, 400), |_| rng.random::<f64>() < 0.4);
+    let fraction = noise.iter().filter(|here| **here).count() as f64 / noise.len() as f64;
+    let rings = radial_mean(two_point(noise.view(), 20).view());
+    assert!((rings[0] - fraction).abs() < 1e-9);
+    // A ring averages about a hundred displacements of 120,000 pairs each.
     assert!(
         rings[1..]
             .iter()
-            .all(|s2| (s2 - share * share).abs() < 5.0 * 0.25 / 120_000_f64.sqrt())
+            .all(|s2| (s2 - fraction * fraction).abs() < 5.0 * 0.25 / 120_000_f64.sqrt())
     );
 }

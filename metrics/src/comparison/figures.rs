@@ -1,21 +1,21 @@
-//! What a comparison found: figures beside their floors, and the curves behind them.
+//! Results of a comparison: figures with their floors, and the curves behind them.
 
-/// One measure of a solid beside its exemplar.
+/// One measure of a solid and its exemplar.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figure {
-    /// What the solid's slices show; `None` where nothing could be measured (no fringe inside a slice, slices smaller than the patches).
+    /// Value of the solid's slices; `None` if it cannot be measured (no fringe inside a slice, slices smaller than the patches).
     pub value: Option<f64>,
-    /// What a perfect solid shows: 0 of a distance, 1 of a ratio, the exemplar's own figure of anything else.
+    /// Value of a perfect solid: 0 for a distance, 1 for a ratio, else the exemplar's own value.
     pub ideal: Option<f64>,
-    /// The exemplar against itself: how far from the ideal two halves of the exemplar are from each other, mean over cuts side by side and one above the other. A solid as near as that cannot be told from the exemplar.
+    /// Distance from the ideal of one half of the exemplar compared with the other, mean over left and right halves and upper and lower ones. A solid at that distance cannot be distinguished from the exemplar.
     pub floor: Option<f64>,
 }
 
 impl Figure {
-    /// Distance of the value from the ideal over the floor: at most about 1 where the solid is as good as the exemplar can tell.
+    /// Distance of the value from the ideal, in floors: at most about 1 if the solid cannot be distinguished from the exemplar.
     ///
     /// ```
-    /// use stereology_exemplar::measure::Figure;
+    /// use stereology_metrics::Figure;
     ///
     /// let figure = Figure { value: Some(0.9), ideal: Some(1.0), floor: Some(0.05) };
     /// assert!((figure.in_floors().unwrap() - 2.0).abs() < 1e-12);
@@ -41,7 +41,7 @@ pub struct Comparison {
     pub coherence: Figure,
     /// Mean length of the fringes that lie inside a window, pixels.
     pub fringe_length: Figure,
-    /// Mean length of fringes by their ends, free of the window's bias, pixels.
+    /// Mean length of fringes by their ends, without the window's bias, pixels.
     pub fringe_length_by_ends: Figure,
     /// Mean tortuosity of fringes.
     pub tortuosity: Figure,
@@ -57,9 +57,9 @@ pub struct Comparison {
     pub swd7: Figure,
     /// Sliced Wasserstein distance of 16 × 16 patches.
     pub swd16: Figure,
-    /// Mean gradient over the exemplar's: under 1 is blur.
+    /// Mean gradient over the exemplar's; below 1 the solid is blurred.
     pub gradient_ratio: Figure,
-    /// What the figures were taken from.
+    /// The curves from which the figures are computed.
     pub curves: Curves,
 }
 
@@ -85,14 +85,35 @@ impl Comparison {
             ("gradient_ratio", self.gradient_ratio),
         ]
     }
+
+    /// The figures in the order of [`Comparison::figures`].
+    pub(super) fn figures_mut(&mut self) -> [&mut Figure; 15] {
+        [
+            &mut self.kl_grey,
+            &mut self.std_ratio,
+            &mut self.skewness,
+            &mut self.kl_orientation,
+            &mut self.coherence,
+            &mut self.fringe_length,
+            &mut self.fringe_length_by_ends,
+            &mut self.tortuosity,
+            &mut self.s2,
+            &mut self.lineal_path,
+            &mut self.chord_ratio,
+            &mut self.local_porosity,
+            &mut self.swd7,
+            &mut self.swd16,
+            &mut self.gradient_ratio,
+        ]
+    }
 }
 
 /// Curves of exemplar and solid, each pair `[exemplar, solid]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curves {
-    /// Shares of grey levels in equal bins of 0 to 1.
+    /// Fractions of grey levels in equal bins of 0 to 1.
     pub grey: [Vec<f64>; 2],
-    /// Shares of orientations, bin k about 180 k / 36 degrees from the columns' axis.
+    /// Fractions of orientations; bin k is centred at 180 k / 36 degrees from the columns' axis.
     pub orientation: [Vec<f64>; 2],
     /// S2 of the bright phase by distance, pixels.
     pub two_point: [Vec<f64>; 2],
@@ -102,9 +123,9 @@ pub struct Curves {
     pub two_point_across: [Vec<f64>; 2],
     /// Lineal path of the bright phase by length, mean of rows and columns.
     pub lineal_path: [Vec<f64>; 2],
-    /// Shares of chords of 1, 2, ... pixels, rows and columns together.
+    /// Fractions of chords of 1, 2, ... pixels, rows and columns together.
     pub chords: [Vec<f64>; 2],
-    /// Shares of squares by local porosity, in equal bins of 0 to 1.
+    /// Fractions of squares by local porosity, in equal bins of 0 to 1.
     pub local_porosity: [Vec<f64>; 2],
     /// Lengths of fringes inside windows, pixels, sorted.
     pub fringe_lengths: [Vec<f64>; 2],
@@ -114,14 +135,14 @@ pub struct Curves {
     pub deviations: [Vec<f64>; 2],
     /// Skewness of each slice.
     pub skewnesses: [Vec<f64>; 2],
-    /// Grey level above which a pixel is of the bright phase.
+    /// Grey level above which a pixel belongs to the bright phase.
     pub threshold: f32,
     /// Side of the squares of local porosity, pixels.
     pub cell: usize,
-    /// Period of the fringes, pixels.
-    pub period: f64,
+    /// Period of the fringes, pixels; `None` if no band was given.
+    pub period: Option<f64>,
     /// Direction of the fringes, degrees from the columns' axis, if they have one.
     pub direction: Option<f64>,
-    /// Height and width of the windows in which fringes were followed, pixels.
+    /// Height and width of the windows in which fringes are followed, pixels.
     pub window: [usize; 2],
 }

@@ -1,4 +1,4 @@
-//! Which way a texture runs at each pixel, and how decidedly.
+//! Orientation and coherence of a texture at each pixel, by the structure tensor.
 
 use ndarray::{Array2, Axis, Zip};
 use std::f64::consts::PI;
@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 /// Half the side of the square over which the structure tensor is averaged.
 const REACH: usize = 3;
 
-/// Direction and coherence of a texture, pixel by pixel, without the border of 3 pixels.
+/// Direction and coherence of a texture at each pixel, without the border of 3 pixels.
 ///
 /// # Formula
 ///
@@ -21,13 +21,13 @@ const REACH: usize = 3;
 /// Urs et al. 2012, section 3.2, after Bigun et al. 1991.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrientationField {
-    /// Direction of the texture, 0 to π from the columns' axis; NaN where the picture is flat.
+    /// Direction of the texture, 0 to π from the columns' axis; NaN where the image is flat.
     pub angle: Array2<f64>,
-    /// 0 to 1; NaN where the picture is flat.
+    /// 0 to 1; NaN where the image is flat.
     pub coherence: Array2<f64>,
 }
 
-/// The directions of a picture's texture; empty if the picture is under 7 pixels high or wide.
+/// The directions of an image's texture; empty if the image is less than 7 pixels high or wide.
 ///
 /// # Examples
 ///
@@ -35,7 +35,7 @@ pub struct OrientationField {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::orientation_field;
+/// use stereology_metrics::orientation_field;
 ///
 /// let wave = Array2::from_shape_fn((40, 40), |(_, x)| (x as f32 * 0.7).sin());
 /// let field = orientation_field(&wave);
@@ -43,8 +43,8 @@ pub struct OrientationField {
 /// assert!((field.mean_coherence() - 1.0).abs() < 1e-9);
 /// ```
 #[must_use]
-pub fn orientation_field(picture: &Array2<f32>) -> OrientationField {
-    let (height, width) = picture.dim();
+pub fn orientation_field(image: &Array2<f32>) -> OrientationField {
+    let (height, width) = image.dim();
     if height <= 2 * REACH || width <= 2 * REACH {
         let none = Array2::zeros((0, 0));
         return OrientationField {
@@ -53,9 +53,9 @@ pub fn orientation_field(picture: &Array2<f32>) -> OrientationField {
         };
     }
     let at = |y: usize, x: usize, dy: isize, dx: isize| {
-        // Beyond the border the picture goes on as it ends.
+        // The image is continued beyond its border by its border pixels.
         let place = |p: usize, d: isize, n: usize| p.saturating_add_signed(d).min(n - 1);
-        f64::from(picture[[place(y, dy, height), place(x, dx, width)]])
+        f64::from(image[[place(y, dy, height), place(x, dx, width)]])
     };
     let gradient = Array2::from_shape_fn((height, width), |(y, x)| {
         let v = |dy, dx| at(y, x, dy, dx);
@@ -77,7 +77,7 @@ pub fn orientation_field(picture: &Array2<f32>) -> OrientationField {
         .and(&xy)
         .and(&yy)
         .for_each(|angle, coherence, &xx, &xy, &yy| {
-            // Rounding in the running sums leaves some 1e-16 where the picture is flat.
+            // Rounding in the sums leaves about 1e-16 where the image is flat.
             if xx + yy > 1e-9 {
                 *angle = (0.5 * (2.0 * xy).atan2(xx - yy) + PI / 2.0).rem_euclid(PI);
                 *coherence = ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt() / (xx + yy);
@@ -87,7 +87,7 @@ pub fn orientation_field(picture: &Array2<f32>) -> OrientationField {
 }
 
 impl OrientationField {
-    /// Shares of directions in `bins` equal bins, the first about 0 (so that a wave along an axis does not fall between two). Flat pixels do not count.
+    /// Fractions of directions in `bins` equal bins; the first is centred at 0, so that a wave along an axis lies in the middle of a bin. Flat pixels do not count.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to bins")]
     pub fn histogram(&self, bins: usize) -> Vec<f64> {
@@ -107,7 +107,7 @@ impl OrientationField {
     }
 }
 
-/// Sums over squares of 2 `REACH` + 1, where they lie inside.
+/// Sums over the squares of 2 `REACH` + 1 pixels that lie inside.
 fn box_sums(field: &Array2<f64>) -> Array2<f64> {
     let along = |field: &Array2<f64>, axis: Axis| {
         let n = field.len_of(axis) - 2 * REACH;
@@ -130,7 +130,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
-        /// A plane wave fills the bin of its direction, with coherence one: only rounding and Sobel's small anisotropy are left.
+        /// A plane wave fills the bin of its direction, with coherence 1, up to rounding and the small anisotropy of Sobel's filter.
         #[test]
         fn a_plane_wave_fills_one_bin(degrees in 0.0_f64..180.0, period in 8.0_f64..16.0) {
             let angle = degrees.to_radians();
@@ -140,7 +140,7 @@ mod tests {
                 (phase * std::f64::consts::TAU).sin() as f32
             });
             let field = orientation_field(&wave);
-            // At the border Sobel's filter sees the picture go on flat.
+            // At the border Sobel's filter meets the flat continuation of the image.
             let inner = |(y, x): (usize, usize)| (2..56).contains(&y) && (2..56).contains(&x);
             for ((y, x), found) in field.angle.indexed_iter().filter(|(at, _)| inner(*at)) {
                 prop_assert!(field.coherence[[y, x]] > 0.999);
@@ -150,9 +150,9 @@ mod tests {
         }
     }
 
-    /// Flat pictures have no direction, rather than that of rounding.
+    /// Flat images have no direction, not that of rounding.
     #[test]
-    fn flat_pictures_have_no_direction() {
+    fn flat_images_have_no_direction() {
         let field = orientation_field(&Array2::from_elem((20, 20), 0.3));
         assert!(field.angle.iter().all(|a| a.is_nan()));
         assert_eq!(

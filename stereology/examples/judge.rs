@@ -1,11 +1,11 @@
-//! How like are two textures? `cargo run --release -p stereology-exemplar --example judge`
+//! How similar are two textures? `cargo run --release -p stereology --example judge`
 
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
 use ndarray::Array3;
 use std::ops::ControlFlow;
-use stereology_exemplar::grow::{GrowOptions, grow_picture};
-use stereology_exemplar::measure::{MeasureOptions, compare};
+use stereology::exemplar::grow::{GrowOptions, grow_picture};
+use stereology::pipeline::{CompareOptions, compare_solid};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let go = |_: f64| ControlFlow::Continue(());
@@ -21,12 +21,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             &GrowOptions::default().with_window(window),
             &go,
         )?;
-        let found = compare(&[exemplar.view()], &[grown.view()], &MeasureOptions::default(), &go)?;
+        let found = compare_solid(&[exemplar.view()], &[grown.view()], &CompareOptions::default(), &go)?;
         println!("window {window}:");
         for (name, figure) in found.figures() {
             if let Some(floors) = figure.in_floors() {
                 println!(
-                    "  {name:22} {:8.4}, {floors:6.2} floors off",
+                    "  {name:22} {:8.4}, {floors:6.2} floors from the ideal",
                     figure.value.unwrap_or(f64::NAN)
                 );
             }

@@ -1,16 +1,17 @@
-//! Slices of a volume that fills only a part of its box: what of them can be measured.
+//! Slices of a volume that fills only a part of its box: the parts of them that can be measured.
 
 use std::ops::Range;
 
 use ndarray::{ArrayView2, ArrayView3, ArrayView4, Axis};
 
-use super::Family;
+use super::family::{Family, sections};
 
-/// The largest rectangle of pixels (rows, columns) that lie all inside a mask, by its shorter side and then its area; `None` if none is inside. Of equals the first. Cost: linear in the pixels.
+/// The largest rectangle of pixels (rows, columns) that lies wholly inside a mask, by its shorter side and then its area; `None` if no pixel is inside. Of equal rectangles the first is returned.
+/// Cost: linear in the pixels.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::largest_rectangle;
+/// use stereology_metrics::largest_rectangle;
 ///
 /// let disc = Array2::from_shape_fn((41, 41), |(y, x)| (y as f64 - 20.0).hypot(x as f64 - 20.0) < 20.0);
 /// let (rows, columns) = largest_rectangle(disc.view()).unwrap();
@@ -27,7 +28,7 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
         for (height, &inside) in heights.iter_mut().zip(row) {
             *height = if inside { *height + 1 } else { 0 };
         }
-        // Columns whose heights rise; a lower one ends the rectangles of the higher before it.
+        // Columns of increasing height; a lower column ends the rectangles of the higher ones before it.
         let mut open: Vec<(usize, usize)> = Vec::new();
         for x in 0..=width {
             let height = heights.get(x).copied().unwrap_or(0);
@@ -46,15 +47,15 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
     best
 }
 
-/// As [`sections`](super::sections), of each slice the [`largest_rectangle`] inside a mask (z, y, x) of the volume's size: stone that fills a mesh is measured without the emptiness around it.
+/// The slices of one family, each cut to the [`largest_rectangle`] inside a mask (z, y, x) of the volume's size, so that a solid that fills a mesh is measured without the empty space around it.
 ///
-/// Slices whose rectangle has a shorter side under `least` pixels, or under half of the family's greatest, are left out. Empty if the mask has another size than the volume.
+/// Slices whose rectangle has a shorter side under `least` pixels, or under half of the family's greatest, are left out. Empty if the mask and the volume have different sizes.
 ///
 /// # Examples
 ///
 /// ```
 /// use ndarray::{Array3, Array4};
-/// use stereology_exemplar::measure::{Family, sections_inside};
+/// use stereology_metrics::{Family, sections_inside};
 ///
 /// let ball = Array3::from_shape_fn((41, 41, 41), |(z, y, x)| [z, y, x].iter().map(|&c| (c as f64 - 20.0).powi(2)).sum::<f64>() < 400.0);
 /// let stone = Array4::from_shape_fn((41, 41, 41, 1), |(z, y, x, _)| if ball[[z, y, x]] { 0.5 } else { 0.0 });
@@ -73,7 +74,7 @@ pub fn sections_inside<'a>(
     if mask.dim() != (nz, ny, nx) {
         return Vec::new();
     }
-    let cut: Vec<(ArrayView3<'a, f32>, usize)> = super::sections(volume, family)
+    let cut: Vec<(ArrayView3<'a, f32>, usize)> = sections(volume, family)
         .into_iter()
         .zip(mask.axis_iter(family.normal()))
         .filter_map(|(slice, inside)| {
@@ -97,7 +98,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// As good as the best of all rectangles, looked at one by one.
+        /// As large as the largest of all rectangles, tried one by one.
         #[test]
         fn no_rectangle_is_larger(bits in prop::collection::vec(prop::bool::weighted(0.8), 42)) {
             let mask = Array2::from_shape_vec((6, 7), bits).unwrap();

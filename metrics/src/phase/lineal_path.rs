@@ -2,9 +2,9 @@
 
 use ndarray::{ArrayView2, Axis};
 
-/// How often a segment of `z` pixels' length, laid along an axis at random, lies wholly in the phase: entry z, 0 to `reach`; the phase's share at 0.
+/// Probability that a segment of `z` pixels' length, at a random place along an axis, lies wholly in the phase: entry z, 0 to `reach`; entry 0 is the phase's fraction.
 ///
-/// A segment of length z covers the centres of z + 1 pixels. Entries beyond the picture are 0.
+/// A segment of length z covers the centres of z + 1 pixels. Entries longer than the image are 0.
 ///
 /// # Formula
 ///
@@ -18,7 +18,7 @@ use ndarray::{ArrayView2, Axis};
 ///
 /// ```
 /// use ndarray::{Axis, array};
-/// use stereology_exemplar::measure::lineal_path;
+/// use stereology_metrics::lineal_path;
 ///
 /// let phase = array![[true, true, true, false], [false, true, true, false]];
 /// assert_eq!(lineal_path(phase.view(), Axis(1), 2), [5.0 / 8.0, 3.0 / 6.0, 1.0 / 4.0]);
@@ -41,13 +41,13 @@ pub fn lineal_path(phase: ArrayView2<'_, bool>, along: Axis, reach: usize) -> Ve
         .collect()
 }
 
-/// Lengths in pixels of the chords that lines along an axis cut from the phase; chords that reach the picture's border are left out, as their length is not known.
+/// Lengths in pixels of the chords that lines along an axis cut from the phase. Chords that reach the image's border are left out, since their length is unknown.
 ///
-/// Outside overlapping discs (Poisson) chord lengths are exponential with mean 1 / (2 R λ); the chords left out are rather the long ones.
+/// Outside overlapping discs (Poisson) chord lengths are exponential with mean 1 / (2 R λ). Long chords reach the border more often, so the lengths found are biased towards short ones.
 ///
 /// ```
 /// use ndarray::{Axis, array};
-/// use stereology_exemplar::measure::chord_lengths;
+/// use stereology_metrics::chord_lengths;
 ///
 /// let phase = array![[true, false, true, true, false, true, true]];
 /// assert_eq!(chord_lengths(phase.view(), Axis(1)), [2]);

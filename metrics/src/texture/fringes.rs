@@ -1,26 +1,26 @@
-//! Fringes of a laminar texture: how long they are and how they wind.
+//! Fringes of a laminar texture: their lengths and tortuosities.
 
 use super::level_curves::{LevelCurve, distance, level_curves};
 use ndarray::Array2;
 
-/// Lengths and windings of the fringes of a filtered picture.
+/// Lengths and tortuosities of the fringes of a filtered image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fringes {
-    /// Lengths of the fringes that lie wholly inside the picture, pixels.
+    /// Lengths of the fringes that lie wholly inside the image, pixels.
     pub lengths: Vec<f64>,
-    /// Length over the distance from end to end of each, at least 1.
+    /// Their tortuosities: length over the distance from end to end, at least 1.
     pub tortuosities: Vec<f64>,
-    /// Length of all fringes, those that leave the picture included.
+    /// Total length of all fringes, including those that leave the image.
     pub total_length: f64,
-    /// Ends of fringes inside the picture.
+    /// Number of ends of fringes inside the image.
     pub ends: usize,
 }
 
-/// The fringes of a picture filtered by [`BandPass`](super::BandPass) to fringes `period` pixels apart: its level curves at 0, cut where they turn back.
+/// The fringes of an image that was filtered to a band about one `period` (pixels): its level curves at 0, cut where they turn back.
 ///
-/// A level curve runs along one flank of a fringe, turns about the fringe's end and comes back along the other. It is cut there: where a piece of it as long as the period has its ends
-/// nearer than .7 periods. Curves that close without such a turn, pieces shorter than a period, and pieces that reach the picture's border are not counted among `lengths`; since long fringes reach the border sooner,
-/// `lengths` is biased towards short ones, and pictures are compared in windows of one size. [`Fringes::mean_length_by_ends`] is free of that bias.
+/// A level curve runs along one flank of a fringe, turns around its end and returns along the other flank. It is cut at the turn, which is where the ends of a piece as long as the period are
+/// less than .7 periods from each other. Curves that close without a turn, pieces shorter than a period, and pieces that reach the image's border do not count among `lengths`. Long fringes reach
+/// the border more often, so `lengths` is biased towards short ones and images are compared in windows of one size. [`Fringes::mean_length_by_ends`] does not have this bias.
 ///
 /// # References
 ///
@@ -30,9 +30,9 @@ pub struct Fringes {
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_exemplar::measure::fringes;
+/// use stereology_metrics::fringes;
 ///
-/// // Fringes 10 pixels apart that die away to the left and right.
+/// // Fringes with a period of 10 pixels that fade out to the left and right.
 /// let field = Array2::from_shape_fn((60, 120), |(y, x)| {
 ///     let (u, v) = (x as f64 - 60.0, y as f64);
 ///     (v * std::f64::consts::TAU / 10.0).sin() - (u / 30.0).powi(8)
@@ -74,10 +74,10 @@ impl Fringes {
         mean(&self.tortuosities)
     }
 
-    /// Mean length whatever the window: every fringe has two ends, so it is twice the length seen over the ends seen. `None` without ends.
+    /// Mean length without the bias of the window: every fringe has two ends, so the mean is twice the total length over the number of ends. `None` without ends.
     ///
     /// ```
-    /// use stereology_exemplar::measure::Fringes;
+    /// use stereology_metrics::Fringes;
     ///
     /// let seen = Fringes { total_length: 300.0, ends: 10, ..Fringes::default() };
     /// assert_eq!(seen.mean_length_by_ends(), Some(60.0));
@@ -87,7 +87,7 @@ impl Fringes {
         (self.ends > 0).then(|| 2.0 * self.total_length / self.ends as f64)
     }
 
-    /// Adds what was found on another picture.
+    /// Adds the fringes of another image.
     pub fn extend(&mut self, other: Self) {
         self.lengths.extend(other.lengths);
         self.tortuosities.extend(other.tortuosities);
@@ -100,14 +100,14 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// A curve without its turns, and how many ends of each piece lie inside the picture. A closed curve without a turn is no fringe.
+/// The pieces of a curve between its turns, and how many ends of each lie inside the image. A closed curve without a turn is not a fringe.
 fn pieces(curve: &LevelCurve, period: f64) -> Vec<(LevelCurve, usize)> {
     let points = &curve.points;
     let n = points.len();
     let turns: Vec<bool> = (0..n).map(|at| turns_back(curve, at, period)).collect();
     let mut order: Vec<usize> = (0..n).collect();
     if curve.closed {
-        // Begin at a turn, so that no piece runs over the end of the list.
+        // Begin at a turn, so that no piece continues past the end of the list.
         match turns.iter().position(|&turn| turn) {
             None => return Vec::new(),
             Some(first) => order.rotate_left(first),
@@ -127,7 +127,7 @@ fn pieces(curve: &LevelCurve, period: f64) -> Vec<(LevelCurve, usize)> {
     found
 }
 
-/// Whether the points half a period of arc before and behind are nearer than .7 periods.
+/// Whether the points half a period of arc before and after are less than .7 periods apart.
 fn turns_back(curve: &LevelCurve, at: usize, period: f64) -> bool {
     let points = &curve.points;
     let n = points.len();
@@ -149,9 +149,9 @@ fn turns_back(curve: &LevelCurve, at: usize, period: f64) -> bool {
         }
         None
     };
-    // Near the border there is not enough curve to tell.
+    // Near the border the curve is too short to decide.
     match (walk(n - 1), walk(1)) {
-        (Some(before), Some(behind)) => distance(before, behind) < 0.7 * period,
+        (Some(before), Some(after)) => distance(before, after) < 0.7 * period,
         _ => false,
     }
 }
@@ -171,7 +171,7 @@ mod tests {
         assert!((found.total_length - 15.0 * 63.0).abs() < 1e-6);
     }
 
-    /// A long thin ellipse is one fringe: its two flanks, without its turns. Its round neighbour is none.
+    /// The two flanks of a long thin ellipse are fringes, without its turns. Its round neighbour is not a fringe.
     #[test]
     fn a_closed_curve_is_cut_where_it_turns() {
         let blob = |x: f64, y: f64, a: f64, b: f64| 1.0 - (x / a).powi(2) - (y / b).powi(2);

@@ -1,23 +1,23 @@
-//! All statistics of one set of pictures, under settings shared by all sets that are compared.
+//! All statistics of one set of images, with settings that all compared sets share.
 
-use super::comparison::MeasureError;
-use super::{
-    BandPass, Fringes, Moments, Patches, chord_lengths, fringes, grey, histogram, lineal_path, local_porosity,
-    mean_gradient, moments, orientation_field, two_point,
-};
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use rayon::prelude::*;
 
-/// What must be the same for all pictures that are compared.
+use super::error::MeasureError;
+use super::options::FringeBand;
+use crate::phase::{chord_lengths, lineal_path, local_porosity, two_point};
+use crate::texture::{Fringes, Moments, Patches, fringes, grey, histogram, mean_gradient, moments, orientation_field};
+
+/// Settings that must be the same for all images that are compared.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Settings {
+pub(super) struct Settings<'a> {
     pub threshold: f32,
-    pub band: BandPass,
+    pub band: Option<FringeBand<'a>>,
     /// Longest lag and path, pixels.
     pub reach: usize,
     /// Side of the squares of local porosity.
     pub cell: usize,
-    /// Height and width in which fringes are followed.
+    /// Height and width of the windows in which fringes are followed.
     pub window: [usize; 2],
     pub patches: usize,
 }
@@ -26,9 +26,9 @@ pub(super) const GREY_BINS: usize = 64;
 pub(super) const ORIENTATION_BINS: usize = 36;
 pub(super) const POROSITY_BINS: usize = 20;
 
-/// Statistics of a set of pictures.
+/// Statistics of a set of images.
 #[derive(Debug)]
-pub(super) struct Portrait {
+pub(super) struct Statistics {
     pub grey: Vec<f64>,
     pub moments: Vec<Moments>,
     pub orientation: Vec<f64>,
@@ -44,8 +44,8 @@ pub(super) struct Portrait {
     pub patches: [Patches; 2],
 }
 
-/// Statistics of one picture.
-struct Page {
+/// Statistics of one image.
+struct ImageStatistics {
     grey: Vec<f64>,
     pixels: f64,
     moments: Moments,
@@ -61,33 +61,33 @@ struct Page {
     porosities: Vec<f32>,
 }
 
-impl Portrait {
-    /// Pictures as drawn; `seed` chooses the patches.
-    pub(super) fn of(pictures: &[ArrayView3<'_, f32>], settings: &Settings, seed: u64) -> Result<Self, MeasureError> {
-        let pages: Vec<Page> = pictures
+impl Statistics {
+    /// Statistics of images; `seed` chooses the patches.
+    pub(super) fn of(images: &[ArrayView3<'_, f32>], settings: &Settings<'_>, seed: u64) -> Result<Self, MeasureError> {
+        let each: Vec<ImageStatistics> = images
             .par_iter()
-            .map(|picture| page(picture, settings))
+            .map(|image| image_statistics(image, settings))
             .collect::<Result<_, MeasureError>>()?;
-        let mean = |value: &dyn Fn(&Page) -> f64| pages.iter().map(value).sum::<f64>() / pages.len() as f64;
-        let weighted = |of: &dyn Fn(&Page) -> &Vec<f64>, weight: &dyn Fn(&Page) -> f64| {
-            let mut sum = vec![0.0; of(&pages[0]).len()];
-            for page in &pages {
-                sum.iter_mut().zip(of(page)).for_each(|(s, v)| *s += v * weight(page));
+        let mean = |value: &dyn Fn(&ImageStatistics) -> f64| each.iter().map(value).sum::<f64>() / each.len() as f64;
+        let weighted = |of: &dyn Fn(&ImageStatistics) -> &Vec<f64>, weight: &dyn Fn(&ImageStatistics) -> f64| {
+            let mut sum = vec![0.0; of(&each[0]).len()];
+            for one in &each {
+                sum.iter_mut().zip(of(one)).for_each(|(s, v)| *s += v * weight(one));
             }
-            let total: f64 = pages.iter().map(weight).sum();
+            let total: f64 = each.iter().map(weight).sum();
             sum.iter_mut().for_each(|s| *s /= total.max(f64::MIN_POSITIVE));
             sum
         };
         let mut fringes = Fringes::default();
-        let mut two_point = Array2::zeros(pages[0].two_point.dim());
-        for page in &pages {
-            fringes.extend(page.fringes.clone());
-            two_point += &page.two_point;
+        let mut two_point = Array2::zeros(each[0].two_point.dim());
+        for one in &each {
+            fringes.extend(one.fringes.clone());
+            two_point += &one.two_point;
         }
-        two_point /= pages.len() as f64;
-        let oriented: f64 = pages.iter().map(|p| p.oriented).sum();
-        let coherence = pages.iter().map(|p| p.coherence * p.oriented).sum::<f64>() / oriented.max(1.0);
-        let mut porosities: Vec<f32> = pages.iter().flat_map(|p| p.porosities.iter().copied()).collect();
+        two_point /= each.len() as f64;
+        let oriented: f64 = each.iter().map(|p| p.oriented).sum();
+        let coherence = each.iter().map(|p| p.coherence * p.oriented).sum::<f64>() / oriented.max(1.0);
+        let mut porosities: Vec<f32> = each.iter().flat_map(|p| p.porosities.iter().copied()).collect();
         porosities.sort_unstable_by(f32::total_cmp);
         Ok(Self {
             grey: weighted(&|p| &p.grey, &|p| p.pixels),
@@ -100,10 +100,10 @@ impl Portrait {
                 weighted(&|p| &p.lineal_path[0], &|p| p.pixels),
                 weighted(&|p| &p.lineal_path[1], &|p| p.pixels),
             ],
-            chords: pages.iter().flat_map(|p| p.chords.iter().copied()).collect(),
+            chords: each.iter().flat_map(|p| p.chords.iter().copied()).collect(),
             porosities,
-            patches: [7, 16].map(|side| Patches::draw(pictures, side, settings.patches, seed)),
-            moments: pages.into_iter().map(|p| p.moments).collect(),
+            patches: [7, 16].map(|side| Patches::draw(images, side, settings.patches, seed)),
+            moments: each.into_iter().map(|p| p.moments).collect(),
         })
     }
 
@@ -122,18 +122,19 @@ impl Portrait {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "porosities in single precision suffice")]
-fn page(picture: &ArrayView3<'_, f32>, settings: &Settings) -> Result<Page, MeasureError> {
-    let grey = grey(*picture);
+fn image_statistics(image: &ArrayView3<'_, f32>, settings: &Settings<'_>) -> Result<ImageStatistics, MeasureError> {
+    let grey = grey(*image);
     let field = orientation_field(&grey);
     let phase = grey.mapv(|v| v > settings.threshold);
-    let indicator = phase.mapv(|here| f64::from(u8::from(here)));
     let mut found = Fringes::default();
-    for window in windows(grey.view(), settings.window) {
-        let filtered = settings.band.filter(&window.mapv(f64::from))?;
-        found.extend(fringes(&filtered, settings.band.period));
+    if let Some(band) = settings.band {
+        for window in windows(grey.view(), settings.window) {
+            let filtered = (band.filter)(window).map_err(MeasureError::Filter)?;
+            found.extend(fringes(&filtered, band.period));
+        }
     }
     let path = |axis| lineal_path(phase.view(), Axis(axis), settings.reach);
-    Ok(Page {
+    Ok(ImageStatistics {
         grey: histogram(grey.iter().copied(), GREY_BINS),
         pixels: grey.len() as f64,
         moments: moments(&grey),
@@ -142,7 +143,7 @@ fn page(picture: &ArrayView3<'_, f32>, settings: &Settings) -> Result<Page, Meas
         coherence: field.mean_coherence(),
         gradient: mean_gradient(&grey),
         fringes: found,
-        two_point: two_point(indicator.view(), settings.reach)?,
+        two_point: two_point(phase.view(), settings.reach),
         lineal_path: [path(1), path(0)],
         chords: [1, 0]
             .into_iter()
@@ -150,23 +151,23 @@ fn page(picture: &ArrayView3<'_, f32>, settings: &Settings) -> Result<Page, Meas
             .collect(),
         porosities: local_porosity(phase.view(), settings.cell)
             .iter()
-            .map(|&share| share as f32)
+            .map(|&fraction| fraction as f32)
             .collect(),
     })
 }
 
-/// Windows of one size that together cover a picture, overlapping where they must.
-fn windows(picture: ArrayView2<'_, f32>, [height, width]: [usize; 2]) -> Vec<ArrayView2<'_, f32>> {
+/// Windows of one size that together cover an image, overlapping where necessary.
+fn windows(image: ArrayView2<'_, f32>, [height, width]: [usize; 2]) -> Vec<ArrayView2<'_, f32>> {
     let starts = |n: usize, side: usize| {
         let number = n.div_ceil(side);
         (0..number).map(move |i| if number == 1 { 0 } else { i * (n - side) / (number - 1) })
     };
-    let (h, w) = picture.dim();
+    let (h, w) = image.dim();
     let (height, width) = (height.min(h), width.min(w));
     starts(h, height)
         .flat_map(|y| starts(w, width).map(move |x| (y, x)))
         .map(|(y, x)| {
-            picture
+            image
                 .slice_axis_move(Axis(0), (y..y + height).into())
                 .slice_axis_move(Axis(1), (x..x + width).into())
         })

@@ -71,4 +71,3 @@ pub use iteration::Iteration;
 pub use options::{Method, Search, SolidOptions, Solver, Views};
 pub use scan::Scan;
 pub use synthesis::{LevelReport, Solid, synthesize_solid, synthesize_solid_watched};
-pub mod grow;

@@ -4,7 +4,7 @@
 
 use ndarray::Array3;
 use std::ops::ControlFlow;
-use stereology::exemplar::grow::{GrowOptions, grow_picture};
+use stereology::grow::{GrowOptions, grow_picture};
 use stereology::pipeline::{CompareOptions, compare_solid};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -19,6 +19,7 @@
 //! | [`render`] | What does it look like? |
 //! | [`metrics`] | How similar are two samples, label maps or textures? |
 //! | [`exemplar`] | Which solid has slices like this image? |
+//! | [`grow`] | Which stone fills a mesh and agrees with measurements? |
 //! | [`microgeometry`] | Which relief on this mesh has the contact distribution of that picture? |
 //!
 //! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.
@@ -56,6 +57,8 @@ pub use stereology_anneal as anneal;
 pub use stereology_exemplar as exemplar;
 #[cfg(feature = "grid")]
 pub use stereology_grid as grid;
+#[cfg(feature = "grow")]
+pub use stereology_grow as grow;
 #[cfg(feature = "imaging")]
 pub use stereology_imaging as imaging;
 #[cfg(feature = "kmatrix")]

@@ -9,11 +9,11 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use ndarray::{Array3, Array4, ArrayView3, Axis};
 use serde_json::{Value, json};
-use stereology::exemplar::grow::{
-    self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels,
-};
+use stereology::exemplar::SolidError;
 use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
+use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels};
 use stereology::metrics::{Seams, seams};
+use stereology::pipeline::finish_grown;
 use stereology::segment::read_photo;
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
 
@@ -170,10 +170,10 @@ impl Grow {
         if self.finish > 0 {
             let step = Step::begin("finish", everywhere.quiet);
             let (iterations, seed) = (self.finish, everywhere.seed);
-            grown = grow::finish(&grown, inside, samples, &measured, iterations, seed, &|done| {
+            grown = finish_grown(&grown, inside, samples, &measured, iterations, seed, &|done| {
                 step.at(done)
             })
-            .map_err(|error| self.explained(&error))?;
+            .map_err(|error| self.unfinished(&error))?;
         }
         go_on()?;
         let spacing = [voxels.spacing; 3];
@@ -268,6 +268,15 @@ impl Grow {
             },
             E::EmptyMask => Failure::run(format!("{}: {error}", self.mesh)),
             _ => Failure::run(format!("{}: {error}", self.image.display())),
+        }
+    }
+
+    /// An error of the finishing pass.
+    fn unfinished(&self, error: &SolidError) -> Failure {
+        let image = self.image.display();
+        match error {
+            SolidError::Cancelled | SolidError::ExemplarTooSmall { .. } => Failure::run(format!("{image}: {error}")),
+            _ => Failure::run(format!("{image}: the stone cannot be finished: {error}")),
         }
     }
 

@@ -6,5 +6,4 @@
     reason = "what is drawn is small; what is copied is equal"
 )]
 
-mod growth;
 mod synthesis;

@@ -159,13 +159,13 @@ mod tests {
             for ((dy, dx), found) in s2.indexed_iter() {
                 let (dy, dx) = (signed(dy, 10), signed(dx, 12));
                 let at = |y: usize, x: usize| plane.get([y.checked_add_signed(dy)?, x.checked_add_signed(dx)?]).copied();
-                let pairs: Vec<bool> = plane.indexed_iter().filter_map(|((y, x), here)| Some(*here && at(y, x)?)).collect();
+                let pairs: Vec<bool> = plane.indexed_iter().filter_map(|((y, x), here)| at(y, x).map(|other| *here && other)).collect();
                 prop_assert_eq!(*found, pairs.iter().filter(|both| **both).count() as f64 / pairs.len() as f64);
             }
             for ((dz, dy, dx), found) in s2_volume.indexed_iter() {
                 let d = [signed(dz, 4), signed(dy, 5), signed(dx, 6)];
                 let at = |p: [usize; 3]| volume.get([p[0].checked_add_signed(d[0])?, p[1].checked_add_signed(d[1])?, p[2].checked_add_signed(d[2])?]).copied();
-                let pairs: Vec<bool> = volume.indexed_iter().filter_map(|((z, y, x), here)| Some(*here && at([z, y, x])?)).collect();
+                let pairs: Vec<bool> = volume.indexed_iter().filter_map(|((z, y, x), here)| at([z, y, x]).map(|other| *here && other)).collect();
                 prop_assert_eq!(*found, pairs.iter().filter(|both| **both).count() as f64 / pairs.len() as f64);
             }
         }

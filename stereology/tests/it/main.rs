@@ -9,5 +9,6 @@
 
 mod comparisons;
 mod files;
+mod finishing;
 mod sample;
 mod spheres;

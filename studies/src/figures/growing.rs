@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use ndarray::{Array3, ArrayView3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology::exemplar::grow::{
+use stereology::grow::{
     GrowOptions, Grown, LevelOptions, Planes, Voxels, flood_fill, grow, grow_picture, synthesize_by_levels,
 };
 use stereology::metrics::{Family, seams, sections};

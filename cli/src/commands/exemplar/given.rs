@@ -4,8 +4,8 @@ use std::path::Path;
 
 use ndarray::Array3;
 use stereology::exemplar::FixedVoxel;
-use stereology::exemplar::grow::Voxels;
 use stereology::grid::read_volume;
+use stereology::grow::Voxels;
 
 use crate::answer::Answer;
 use crate::commands::grow::closed_mesh;

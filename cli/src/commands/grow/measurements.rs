@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use nalgebra::Point3;
-use stereology::exemplar::grow::Voxels;
+use stereology::grow::Voxels;
 
 use crate::failure::Failure;
 use crate::voxel_table::{self, Row};

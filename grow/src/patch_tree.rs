@@ -1,68 +1,50 @@
-//! Windows of an exemplar that look like what is known of a window: a tree of patches.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "texels, voxels and cells are fewer than 2^32: `grow` refuses more"
-)]
+//! A tree of the patches of an exemplar, which finds windows similar to the known part of a window.
 
-use ndarray::ArrayView3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// How windows are looked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Search {
-    /// Every window of the exemplar is compared: the reference.
-    Exact,
-    /// Best-first in a tree of patches, so many leaves of up to 32 windows; and the windows that continue what the known neighbours were copied from.
-    Tree {
-        /// Leaves looked at.
-        leaves: usize,
-    },
-}
+use ndarray::ArrayView3;
 
-impl Default for Search {
-    /// 12 leaves: some 400 windows of 60,000.
-    fn default() -> Self {
-        Self::Tree { leaves: 12 }
-    }
-}
+use crate::numbers::number;
+use crate::search::Search;
 
-/// Windows of a leaf.
+/// Most windows in a leaf.
 const LEAF: usize = 32;
 /// A window's rows are padded to a multiple of so many samples.
 const LANES: usize = 4;
-/// Standard deviations about its mean within which all that is known is as near to a part of the tree. With 0, parts of mixed windows are passed over and what is rare in the exemplar dies out (soapstone of docs/grow.md, 20³ voxels:
-/// deviation .82 of the exemplar's, the exact search .92); with .5 it is .91, and the squared difference the same.
+/// Standard deviations from the mean of a node within which a sample has no distance to it. With 0, nodes with different windows are skipped and rare patterns of the exemplar die out (soapstone of docs/grow.md, 20³
+/// voxels: standard deviation .82 of the exemplar's, with the exact search .92); with .5 it is .91, at the same squared difference.
 const NODE_SPREAD: f32 = 0.5;
 
-/// A pixel of a window that is known.
+/// A known sample of a window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
-    /// Which sample of the window: pixel × channels + channel.
-    pub sample: usize,
+pub(crate) struct Known {
+    /// Position in the window: pixel × channels + channel.
+    pub(crate) sample: usize,
     /// Its value.
-    pub value: f32,
-    /// Its weight; all sum to 1.
-    pub weight: f32,
+    pub(crate) value: f32,
+    /// Its weight; the weights sum to 1.
+    pub(crate) weight: f32,
 }
 
-/// A window that was found: its distance and its middle texel, row × width + column.
-pub(super) type Match = (f32, u32);
+/// A window found: its distance and its central texel, row × width + column.
+pub(crate) type Match = (f32, u32);
 
-/// All whole windows of an exemplar, split in two over and over along the direction in which they differ most, down to leaves whose windows are compared one by one, row by row, the heaviest row first, until they are too far.
+/// All whole windows of an exemplar, split recursively in two along the direction of their largest variance. The windows of a leaf are compared one by one, row by row, the row of largest weight first, until their distance is too
+/// large.
 #[derive(Debug)]
-pub(super) struct PatchTree<'a> {
+pub(crate) struct PatchTree<'a> {
     exemplar: ArrayView3<'a, f32>,
     reach: usize,
-    /// Samples of a window, without and with what pads its rows.
+    /// Samples of a window, without and with the padding of its rows.
     samples: usize,
     padded: usize,
     /// The exemplar's samples, row by row, and a few zeros.
     plain: Vec<f32>,
     nodes: Vec<Node>,
-    /// Mean window of each node, rows padded, and then how far its windows commonly are from it.
+    /// Mean window of each node, rows padded, followed by the tolerated deviations from it.
     means: Vec<f32>,
-    /// Middle texels of the windows, leaf by leaf.
+    /// Central texels of the windows, leaf by leaf.
     texels: Vec<u32>,
 }
 
@@ -73,12 +55,12 @@ enum Node {
 }
 
 impl<'a> PatchTree<'a> {
-    /// Windows of side 2 `reach` + 1, which must fit into the exemplar. Cost: N log N times the window, 50 ms for 256² texels and 5 × 5.
-    pub(super) fn new(exemplar: ArrayView3<'a, f32>, reach: usize) -> Self {
+    /// The tree of the windows of side 2 `reach` + 1, which must fit into the exemplar. Cost: N log N times the samples of a window; 50 ms for 256² texels and 5 × 5.
+    pub(crate) fn new(exemplar: ArrayView3<'a, f32>, reach: usize) -> Self {
         let (height, width, channels) = exemplar.dim();
         let side = 2 * reach + 1;
         let mut texels: Vec<u32> = (reach..height - reach)
-            .flat_map(|y| (reach..width - reach).map(move |x| (y * width + x) as u32))
+            .flat_map(|y| (reach..width - reach).map(move |x| number(y * width + x)))
             .collect();
         let row = side * channels;
         let mut tree = Self {
@@ -100,7 +82,7 @@ impl<'a> PatchTree<'a> {
         (2 * self.reach + 1) * self.exemplar.dim().2
     }
 
-    /// Where the window about a texel begins.
+    /// First sample of the window about a texel.
     fn first(&self, texel: u32) -> usize {
         let (_, width, channels) = self.exemplar.dim();
         (texel as usize - self.reach * width - self.reach) * channels
@@ -115,11 +97,11 @@ impl<'a> PatchTree<'a> {
         }
     }
 
-    /// Adds a node over these windows and everything below it; returns its number.
+    /// Adds a node with these windows and its descendants; returns its number.
     fn grow(&mut self, texels: &mut [u32]) -> u32 {
-        let node = self.nodes.len() as u32;
+        let node = number(self.nodes.len());
         let n = self.samples;
-        // A hundred windows tell the mean and the direction well enough.
+        // About a hundred windows determine the mean and the direction well enough.
         let stride = texels.len().div_ceil(96).max(1);
         let mut some = Vec::new();
         let mut window = vec![0.0; n];
@@ -140,37 +122,37 @@ impl<'a> PatchTree<'a> {
                 .for_each(|(s, (v, m))| *s += (v - m) * (v - m) / count);
         }
         self.nodes.push(Node::Leaf { first: 0, last: 0 });
-        let commonly = if texels.len() <= LEAF { 0.0 } else { NODE_SPREAD };
+        let tolerated = if texels.len() <= LEAF { 0.0 } else { NODE_SPREAD };
         let (start, row) = (self.means.len(), self.row());
         let wide = row.next_multiple_of(LANES);
         self.means.resize(start + 2 * self.padded, 0.0);
         for (sample, (mean, spread)) in mean.iter().zip(&spread).enumerate() {
             let at = start + sample / row * wide + sample % row;
             self.means[at] = *mean;
-            self.means[at + self.padded] = commonly * spread.sqrt();
+            self.means[at + self.padded] = tolerated * spread.sqrt();
         }
         if texels.len() <= LEAF {
-            let first = self.texels.len() as u32;
+            let first = number(self.texels.len());
             self.texels.extend_from_slice(texels);
             self.nodes[node as usize] = Node::Leaf {
                 first,
-                last: self.texels.len() as u32,
+                last: number(self.texels.len()),
             };
             return node;
         }
         let direction = principal(&some, &mean);
-        let mut seen: Vec<(f32, u32)> = texels
+        let mut projected: Vec<(f32, u32)> = texels
             .iter()
             .map(|&texel| {
                 self.window(texel, &mut window);
                 (window.iter().zip(&direction).map(|(v, d)| v * d).sum(), texel)
             })
             .collect();
-        let half = seen.len() / 2;
-        seen.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        texels.iter_mut().zip(&seen).for_each(|(t, s)| *t = s.1);
+        let half = projected.len() / 2;
+        projected.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        texels.iter_mut().zip(&projected).for_each(|(t, s)| *t = s.1);
         let (low, high) = texels.split_at_mut(half);
-        // The order inside a half must not depend on how it was selected.
+        // The order within a half must not depend on the selection algorithm.
         low.sort_unstable();
         high.sort_unstable();
         let children = [self.grow(low), self.grow(high)];
@@ -178,8 +160,9 @@ impl<'a> PatchTree<'a> {
         node
     }
 
-    /// Windows whose distance to what is known is at most `1 + tolerance` times the least, sorted by texel, and the least distance; `more` are texels to look at besides, `salt` chooses among parts of the tree that are as near.
-    pub(super) fn like(
+    /// Writes to `found` the windows whose distance to the known samples is at most `1 + tolerance` times the least, sorted by texel, and returns the least distance. The windows about the texels `more` are
+    /// compared too; `salt` chooses among nodes at equal distance.
+    pub(crate) fn similar(
         &self,
         known: &[Known],
         more: &[u32],
@@ -192,14 +175,14 @@ impl<'a> PatchTree<'a> {
         let mut best = f32::INFINITY;
         let factor = 1.0 + tolerance;
         let sought = Sought::new(known, self.row(), self.padded);
-        self.look(more, &sought, factor, &mut best, found);
+        self.compare(more, &sought, factor, &mut best, found);
         match search {
-            Search::Exact => self.look(&self.texels, &sought, factor, &mut best, found),
+            Search::Exact => self.compare(&self.texels, &sought, factor, &mut best, found),
             Search::Tree { leaves } => {
                 let mut open = BinaryHeap::new();
                 let mut next = Some(0);
                 for _ in 0..leaves.max(1) {
-                    // From the nearest part that waits straight down to a leaf, always to the nearer half; the other waits.
+                    // From the nearest open node down to a leaf, always to the nearer child; the other child stays open.
                     let Some(mut node) = next.take().or_else(|| open.pop().map(|open: Open| open.node)) else {
                         break;
                     };
@@ -215,7 +198,7 @@ impl<'a> PatchTree<'a> {
                     }
                     if let Node::Leaf { first, last } = self.nodes[node as usize] {
                         let texels = &self.texels[first as usize..last as usize];
-                        self.look(texels, &sought, factor, &mut best, found);
+                        self.compare(texels, &sought, factor, &mut best, found);
                     }
                 }
             }
@@ -227,7 +210,7 @@ impl<'a> PatchTree<'a> {
     }
 
     /// Compares the windows about these texels.
-    fn look(&self, texels: &[u32], sought: &Sought, factor: f32, best: &mut f32, found: &mut Vec<Match>) {
+    fn compare(&self, texels: &[u32], sought: &Sought, factor: f32, best: &mut f32, found: &mut Vec<Match>) {
         for &texel in texels {
             let distance = self.distance(sought, texel, factor * *best);
             if distance <= factor * *best {
@@ -237,7 +220,7 @@ impl<'a> PatchTree<'a> {
         }
     }
 
-    /// How far what is known is from where a node's windows commonly lie.
+    /// Distance of the known samples from the tolerated range of a node's windows.
     fn distance_of_node(&self, sought: &Sought, node: u32) -> f32 {
         let start = 2 * self.padded * node as usize;
         let (means, _) = self.means[start..start + self.padded].as_chunks::<LANES>();
@@ -256,7 +239,7 @@ impl<'a> PatchTree<'a> {
         sums.iter().sum()
     }
 
-    /// Distance of the window about a texel whose window is whole; once it is more than `most`, something between that and the distance.
+    /// Distance of the whole window about a texel; if it is larger than `most`, some number between `most` and the distance.
     fn distance(&self, sought: &Sought, texel: u32, most: f32) -> f32 {
         let (_, width, channels) = self.exemplar.dim();
         let first = self.first(texel);
@@ -266,8 +249,8 @@ impl<'a> PatchTree<'a> {
             let (theirs, _) = self.plain[from..from + wanted.len() * LANES].as_chunks::<LANES>();
             for (theirs, (value, weight)) in theirs.iter().zip(wanted) {
                 for lane in 0..LANES {
-                    let off = theirs[lane] - value[lane];
-                    sums[lane] += weight[lane] * off * off;
+                    let difference = theirs[lane] - value[lane];
+                    sums[lane] += weight[lane] * difference * difference;
                 }
             }
             let sum: f32 = sums.iter().sum();
@@ -278,30 +261,30 @@ impl<'a> PatchTree<'a> {
         sums.iter().sum()
     }
 
-    /// The texel `(row, column)` steps away from another, if the window about it is whole.
-    pub(super) fn beside(&self, texel: u32, row: isize, column: isize) -> Option<u32> {
+    /// The texel `(row, column)` steps away from another, if the window about it lies inside the exemplar.
+    pub(crate) fn beside(&self, texel: u32, row: isize, column: isize) -> Option<u32> {
         let (height, width, _) = self.exemplar.dim();
         let y = (texel as usize / width).checked_add_signed(row)?;
         let x = (texel as usize % width).checked_add_signed(column)?;
         let whole = (self.reach..height - self.reach).contains(&y) && (self.reach..width - self.reach).contains(&x);
-        whole.then_some((y * width + x) as u32)
+        whole.then_some(number(y * width + x))
     }
 }
 
-/// Values and weights of so many neighbouring samples.
+/// Values and weights of neighbouring samples.
 type Lane = ([f32; LANES], [f32; LANES]);
 
-/// What is known, row by row, the heaviest row first; weight 0 where nothing is.
+/// The known samples, row by row; unknown samples have weight 0.
 struct Sought {
     lanes: Vec<Lane>,
-    /// Rows of which something is known.
+    /// Rows with known samples, the row of largest weight first.
     rows: Vec<usize>,
-    /// Lanes a row.
+    /// Lanes per row.
     across: usize,
 }
 
 impl Sought {
-    /// `row` samples a row, `padded` in all.
+    /// `row` samples per row, `padded` in all.
     fn new(known: &[Known], row: usize, padded: usize) -> Self {
         let across = row.div_ceil(LANES);
         let mut lanes = vec![([0.0; LANES], [0.0; LANES]); padded / LANES];
@@ -325,17 +308,17 @@ impl Sought {
     }
 }
 
-/// A number that looks random.
+/// A pseudo-random function of a number.
 fn shuffled(number: u32) -> u32 {
     let mixed = (number ^ (number >> 16)).wrapping_mul(0x7feb_352d);
     let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x846c_a68b);
     mixed ^ (mixed >> 16)
 }
 
-/// Direction in which windows differ most, by a few rounds of power iteration.
+/// Direction of the largest variance of the windows, by a few power iterations.
 fn principal(windows: &[f32], mean: &[f32]) -> Vec<f32> {
     let n = mean.len();
-    // A start that is orthogonal to nothing in particular, and the same everywhere.
+    // A fixed start that is unlikely to be orthogonal to the result.
     let mut direction: Vec<f32> = (0..n).map(|i| 1.0 + 0.37 * ((i * 7919) % 13) as f32 / 13.0).collect();
     for _ in 0..4 {
         let mut next = vec![0.0; n];
@@ -361,11 +344,11 @@ fn principal(windows: &[f32], mean: &[f32]) -> Vec<f32> {
     direction
 }
 
-/// A part of the tree that waits; the nearest comes first, of equals the first.
+/// An open node; the nearest comes first.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     distance: f32,
-    /// Random, so that of parts that are as near each has its chance: what is common in the exemplar must not hide what is rare.
+    /// Random, so that each of several equally near nodes can come first: common patterns of the exemplar must not hide rare ones.
     tie: u32,
     node: u32,
 }
@@ -396,12 +379,14 @@ impl Eq for Open {}
 
 #[cfg(test)]
 mod tests {
-    use super::{Known, PatchTree, Search, Sought};
+    use super::{Known, PatchTree, Sought};
+    use crate::numbers::number;
+    use crate::search::Search;
     use ndarray::Array3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn picture(seed: u64) -> Array3<f32> {
+    fn texture(seed: u64) -> Array3<f32> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let noise = Array3::from_shape_fn((52, 42, 1), |_| rng.random::<f32>());
         Array3::from_shape_fn((50, 40, 1), |(y, x, _)| {
@@ -409,10 +394,10 @@ mod tests {
         })
     }
 
-    /// The exact search is the least over all windows; the tree's result is one of them, and nearly as near.
+    /// The exact search finds the least distance of all windows; the tree finds one of them, at nearly that distance.
     #[test]
     fn the_tree_finds_what_brute_force_finds() {
-        let (exemplar, other) = (picture(1), picture(2));
+        let (exemplar, other) = (texture(1), texture(2));
         let tree = PatchTree::new(exemplar.view(), 2);
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let (mut found, mut exact_sum, mut tree_sum) = (Vec::new(), 0.0, 0.0);
@@ -428,12 +413,12 @@ mod tests {
                 .collect();
             let brute = (2..48)
                 .flat_map(|y| (2..38).map(move |x| y * 40 + x))
-                .map(|texel| tree.distance(&Sought::new(&known, 5, 40), texel as u32, f32::INFINITY))
+                .map(|texel| tree.distance(&Sought::new(&known, 5, 40), number(texel), f32::INFINITY))
                 .fold(f32::INFINITY, f32::min);
-            let exact = tree.like(&known, &[], Search::Exact, 0.1, 0, &mut found);
+            let exact = tree.similar(&known, &[], Search::Exact, 0.1, 0, &mut found);
             assert!((exact - brute).abs() <= 1e-6 * (1.0 + brute), "{exact} {brute}");
             assert!(!found.is_empty() && found.iter().all(|(d, _)| *d <= 1.1 * exact + 1e-9));
-            let quick = tree.like(&known, &[], Search::Tree { leaves: 12 }, 0.1, 7, &mut found);
+            let quick = tree.similar(&known, &[], Search::Tree { leaves: 12 }, 0.1, 7, &mut found);
             assert!(quick >= exact - 1e-7);
             exact_sum += f64::from(exact);
             tree_sum += f64::from(quick);

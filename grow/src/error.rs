@@ -1,12 +1,12 @@
-//! Why nothing can be grown.
+//! Reasons why nothing can be grown.
 
 /// Stone cannot be grown from this exemplar in this mask around these measurements.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GrowError {
-    /// The exemplar holds no whole window.
+    /// The exemplar contains no whole window.
     #[error(
-        "an exemplar of {width} x {height} pixels holds no window of {window} x {window}; use a larger picture or a smaller window"
+        "an exemplar of {width} x {height} pixels contains no window of {window} x {window}; use a larger image or a smaller window"
     )]
     ExemplarTooSmall {
         /// Columns.
@@ -19,7 +19,7 @@ pub enum GrowError {
     /// The exemplar has one colour.
     #[error("every pixel of the exemplar has the same colour: there is nothing to learn from it")]
     ConstantExemplar,
-    /// The exemplar holds NaN or infinity.
+    /// The exemplar contains NaN or infinity.
     #[error("the exemplar's pixel at row {row}, column {column} is NaN or infinite")]
     NotFinite {
         /// Row of the pixel.
@@ -30,13 +30,13 @@ pub enum GrowError {
     /// The window's side is even or out of range.
     #[error("the window's side is 0 (the histogram alone) or an odd number of pixels from 3 to 15, not {window}")]
     Window {
-        /// Side asked for.
+        /// Side requested.
         window: usize,
     },
     /// The number of voxels is out of range.
     #[error("the mesh's longest side can have 1 to 2,048 voxels, not {resolution}")]
     Resolution {
-        /// Voxels asked for.
+        /// Voxels requested.
         resolution: usize,
     },
     /// No voxel centre lies inside.
@@ -44,10 +44,11 @@ pub enum GrowError {
     EmptyMask,
     /// A measured voxel lies outside.
     #[error(
-        "measurement {number} at voxel {at:?} (x, y, z) lies outside the mask of {size:?} voxels; remove it, or correct its place"
+        "measurement {number} at voxel (x, y, z) = ({}, {}, {}) lies outside the mask of {} x {} x {} voxels; remove it, or correct its place",
+        .at[0], .at[1], .at[2], .size[0], .size[1], .size[2]
     )]
     OutsideMask {
-        /// Which measurement, from 1.
+        /// Number of the measurement, from 1.
         number: usize,
         /// Voxel x, y, z.
         at: [usize; 3],
@@ -56,7 +57,8 @@ pub enum GrowError {
     },
     /// Two measurements of one voxel differ.
     #[error(
-        "measurements {first} and {second} fall into one voxel {at:?} (x, y, z) with different values, {a:?} and {b:?}; remove one, average them, or use a higher resolution"
+        "measurements {first} and {second} lie in one voxel, (x, y, z) = ({}, {}, {}), with different values, {a:?} and {b:?}; remove one, average them, or use a higher resolution",
+        .at[0], .at[1], .at[2]
     )]
     Contradicting {
         /// First measurement, from 1.
@@ -70,25 +72,25 @@ pub enum GrowError {
         /// Value of the second.
         b: Vec<f32>,
     },
-    /// A measurement has another number of channels than the exemplar, or a value that is none.
+    /// A measurement has another number of channels than the exemplar, or a value that is not finite.
     #[error(
         "measurement {number} has the values {found:?}; the exemplar has {channels} channel(s), so as many finite numbers are needed"
     )]
     Value {
-        /// Which measurement, from 1.
+        /// Number of the measurement, from 1.
         number: usize,
-        /// What was given.
+        /// The values given.
         found: Vec<f32>,
         /// Channels of the exemplar.
         channels: usize,
     },
-    /// More than 32 bits can number.
-    #[error("the box holds more than 4,294,967,295 voxels, or the exemplar so many samples; use a lower resolution")]
+    /// More voxels or samples than 32 bits can number.
+    #[error("the box has 4,294,967,295 voxels or more, or the exemplar that many samples; use a lower resolution")]
     TooLarge,
     /// Neither seeds nor measurements.
     #[error("nothing to grow from: give measurements, or at least one seed")]
     NoSeeds,
-    /// The exemplar cannot be halved so often.
+    /// The exemplar cannot be halved that often.
     #[error(
         "an exemplar of {width} x {height} pixels can have 1 to {most} levels with windows of {window} x {window}, not {levels}"
     )]
@@ -99,15 +101,12 @@ pub enum GrowError {
         height: usize,
         /// Side of the window, pixels.
         window: usize,
-        /// Levels asked for.
+        /// Levels requested.
         levels: usize,
         /// Most levels possible.
         most: usize,
     },
-    /// The finishing pass cannot be made.
-    #[error("the stone cannot be finished: {0}")]
-    Finish(crate::SolidError),
-    /// The callback broke off.
+    /// The progress callback cancelled the work.
     #[error("cancelled")]
     Cancelled,
 }

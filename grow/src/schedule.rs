@@ -1,37 +1,35 @@
-//! Which voxel can be filled when: an order of filling, and the rounds in which voxels that do not see each other are filled at once.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "texels, voxels and cells are fewer than 2^32: `grow` refuses more"
-)]
+//! The schedule of filling: rounds of voxels whose windows do not contain each other, so that they can be filled at the same time.
 
-use super::planes::Layout;
-use super::voxels::moved;
 use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What was drawn for a voxel before any value is known.
+use crate::neighbours::moved;
+use crate::numbers::{number, small};
+use crate::planes::Layout;
+
+/// Random choices for a voxel, drawn before any value is known.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Draw {
-    /// Plane and turn of its window; `None` if no plane shows anything that was filled before.
-    pub window: Option<(u8, u8)>,
-    /// Chooses among the windows that are found, 0 to 1.
-    pub choice: f32,
+pub(crate) struct Draw {
+    /// Plane and turn of its window; `None` if no plane contains a voxel that was filled before.
+    pub(crate) window: Option<(u8, u8)>,
+    /// Chooses among the windows found, 0 to 1.
+    pub(crate) choice: f32,
 }
 
-/// Voxels by round: a voxel's window shows only voxels of earlier rounds, or later ones of the order, which do not count. Filling round by round gives the same solid as filling one by one.
+/// Voxels by round. A voxel's window contains only voxels of earlier rounds, and voxels later in the order, which do not count; so filling round by round gives the same solid as filling one by one.
 #[derive(Debug)]
-pub(super) struct Schedule {
+pub(crate) struct Schedule {
     /// Place of each voxel in the order of filling; `u32::MAX` outside.
-    pub place: Array3<u32>,
+    pub(crate) place: Array3<u32>,
     /// Draws by place in the order.
-    pub draws: Vec<Draw>,
+    pub(crate) draws: Vec<Draw>,
     /// Places in the order, by round.
-    pub rounds: Vec<Vec<u32>>,
+    pub(crate) rounds: Vec<Vec<u32>>,
 }
 
 /// `given` voxels at the beginning of the order have their values already.
-pub(super) fn schedule(
+pub(crate) fn schedule(
     order: &[[usize; 3]],
     given: usize,
     size: (usize, usize, usize),
@@ -40,7 +38,7 @@ pub(super) fn schedule(
 ) -> Schedule {
     let mut place = Array3::from_elem(size, u32::MAX);
     for (at, voxel) in order.iter().enumerate() {
-        place[*voxel] = at as u32;
+        place[*voxel] = number(at);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rounds: Vec<Vec<u32>> = Vec::new();
@@ -65,7 +63,7 @@ pub(super) fn schedule(
                     .map(|&other| round_of[other as usize])
                     .max();
                 if let Some(latest) = latest {
-                    draw.window = Some((plane as u8, turn as u8));
+                    draw.window = Some((small(plane), small(turn)));
                     round = latest + 1;
                     break;
                 }
@@ -75,7 +73,7 @@ pub(super) fn schedule(
             if rounds.len() < round as usize {
                 rounds.resize(round as usize, Vec::new());
             }
-            rounds[round as usize - 1].push(at as u32);
+            rounds[round as usize - 1].push(number(at));
         }
         draws.push(draw);
     }

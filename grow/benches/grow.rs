@@ -4,7 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array3;
 use std::ops::ControlFlow;
-use stereology_exemplar::grow::{GrowOptions, grow};
+use stereology_grow::{GrowOptions, grow};
 
 fn bench(criterion: &mut Criterion) {
     let picture = Array3::from_shape_fn((128, 128, 1), |(y, x, _)| ((x * x + 3 * y * y + x * y) % 251) as f32);

@@ -1,23 +1,25 @@
 //! Priority flood fill: all seeds grow at once, nearest voxels first.
 
-use super::voxels::{is_inside, moved, neighbours};
-use ndarray::{Array3, ArrayView3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// In which order voxels are filled, and from which seed.
+use ndarray::{Array3, ArrayView3};
+
+use crate::neighbours::{is_inside, moved, neighbours};
+
+/// The order in which voxels are filled, and the seed from which each is reached.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FloodFill {
     /// Voxels (z, y, x) in the order of filling; the seeds come first.
     pub order: Vec<[usize; 3]>,
-    /// Label of the seed a voxel was reached from; 0 where nothing was filled.
+    /// Label of the seed from which a voxel is reached; 0 for voxels that are not filled.
     pub labels: Array3<u32>,
 }
 
-/// Fills the mask (z, y, x) outwards from seed voxels: a heap keyed by (distance to the own seed, number of insertion) gives the next voxel, so that each seed's cell is its Voronoi cell.
+/// Fills the mask (z, y, x) outwards from seed voxels. A heap ordered by distance to the own seed, then by time of insertion, gives the next voxel, so that each seed's cell is its Voronoi cell.
 ///
-/// Seeds carry labels from 1; several may share one. Distances are straight, in voxels, and fronts step to all 26 neighbours, so a cell reaches around corners of the mask. Seeds outside the mask, and repeated ones, are skipped.
-/// What no front reaches stays 0. Cost: N log N.
+/// Seeds carry labels from 1; several may share one. Distances are Euclidean, in voxels, and the front advances to all 26 neighbours, so a cell extends around corners of the mask. Seeds outside the mask and
+/// repeated seeds are skipped. Voxels of components without a seed keep the label 0. Cost: N log N.
 ///
 /// # References
 ///
@@ -27,7 +29,7 @@ pub struct FloodFill {
 ///
 /// ```
 /// use ndarray::Array3;
-/// use stereology_exemplar::grow::flood_fill;
+/// use stereology_grow::flood_fill;
 ///
 /// let line = Array3::from_elem((1, 1, 6), true);
 /// let fill = flood_fill(line.view(), &[([0, 0, 0], 1), ([0, 0, 5], 2)]);
@@ -84,7 +86,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(30))]
 
-        /// In a box every voxel falls to its nearest seed: Voronoi cells. A front may miss the few voxels of a cell that hang on it by less than a corner.
+        /// In a box every voxel belongs to its nearest seed: Voronoi cells. The front may miss the few voxels of a cell that are not connected with it by neighbours.
         #[test]
         fn cells_are_voronoi_cells(seeds in prop::collection::btree_set((0_usize..16, 0_usize..16, 0_usize..16), 1..12)) {
             let seeds: Vec<[usize; 3]> = seeds.into_iter().map(|(z, y, x)| [z, y, x]).collect();
@@ -98,15 +100,15 @@ mod tests {
                 square(seeds[**label as usize - 1], here) > nearest
             });
             prop_assert!(wrong.count() <= 4);
-            // Distances never fall along the order.
+            // Distances do not decrease along the order.
             let of = |v: &[usize; 3]| square(seeds[fill.labels[*v] as usize - 1], *v);
             prop_assert!(fill.order.windows(2).filter(|pair| of(&pair[0]) > of(&pair[1])).count() <= 4);
         }
     }
 
-    /// A wall parts the mask: what lies behind it is not reached.
+    /// A wall divides the mask: voxels behind it are not reached.
     #[test]
-    fn what_is_not_connected_stays_empty() {
+    fn unconnected_voxels_stay_empty() {
         let mut mask = Array3::from_elem((3, 3, 7), true);
         mask.index_axis_mut(ndarray::Axis(2), 3).fill(false);
         let fill = flood_fill(mask.view(), &[([0, 0, 0], 7), ([9, 9, 9], 1)]);

@@ -1,30 +1,30 @@
-//! Windows of an exemplar laid into planes through a voxel.
+//! Windows in planes through a voxel.
 
 use nalgebra::Vector3;
 
-/// The planes in which a voxel's surroundings are looked at.
+/// The planes in which the windows about a voxel lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Planes {
     /// The three planes of the axes.
     #[default]
     Axis,
-    /// Those, the six diagonal to two axes and the four diagonal to all three; pixels are the nearest voxels.
+    /// Also the six planes diagonal to two axes and the four diagonal to all three; each pixel is the nearest voxel.
     Oblique,
 }
 
-/// Where each pixel of a window lies, as steps from the voxel (z, y, x); `None` for the middle and for pixels whose voxel is another's already.
-pub(super) type Layout = Vec<Option<[isize; 3]>>;
+/// The position of each pixel of a window, as a step (z, y, x) from the voxel; `None` for the centre and for pixels whose nearest voxel belongs to another pixel.
+pub(crate) type Layout = Vec<Option<[isize; 3]>>;
 
-/// Layouts by plane, then by the eight turns and mirrorings of the window (the first is none).
-pub(super) fn layouts(planes: Planes, reach: usize) -> Vec<Vec<Layout>> {
+/// Layouts by plane, then by the eight rotations and reflections of the window (the first is the identity).
+pub(crate) fn layouts(planes: Planes, reach: usize) -> Vec<Vec<Layout>> {
     frames(planes)
         .iter()
         .map(|frame| (0..8).map(|turn| layout(frame, reach, turn)).collect())
         .collect()
 }
 
-/// The layout of a picture: rows down, columns to the right.
-pub(super) fn picture_layout(reach: usize) -> Vec<Vec<Layout>> {
+/// The layout of an image: rows down, columns to the right.
+pub(crate) fn image_layout(reach: usize) -> Vec<Vec<Layout>> {
     vec![vec![layout(
         &[Vector3::new(0.0, 1.0, 0.0), Vector3::new(0.0, 0.0, 1.0)],
         reach,
@@ -70,11 +70,11 @@ fn layout(frame: &[Vector3<f64>; 2], reach: usize, turn: usize) -> Layout {
     let places: Vec<([isize; 3], f64)> = (0..side * side).map(place).collect();
     (0..places.len())
         .map(|pixel| {
-            let (at, off) = places[pixel];
+            let (at, error) = places[pixel];
             let taken = places
                 .iter()
                 .enumerate()
-                .any(|(other, (there, error))| *there == at && (*error, other) < (off, pixel));
+                .any(|(other, (there, its_error))| *there == at && (*its_error, other) < (error, pixel));
             (at != [0; 3] && !taken).then_some(at)
         })
         .collect()
@@ -85,16 +85,16 @@ mod tests {
     use super::{Planes, layouts};
     use std::collections::BTreeSet;
 
-    /// A window in a plane of the axes has all its pixels; the eight turns of it are the same set of voxels.
+    /// A window in a plane of the axes has all its pixels, and its eight rotations and reflections are the same set of voxels.
     #[test]
-    fn turns_are_turns_of_one_set() {
+    fn turns_permute_one_set() {
         let all = layouts(Planes::Oblique, 2);
         assert_eq!(all.len(), 13);
         for (plane, turns) in all.iter().enumerate() {
             let sets: Vec<BTreeSet<_>> = turns.iter().map(|l| l.iter().flatten().copied().collect()).collect();
             if plane < 3 {
                 assert!(sets.iter().all(|set| set.len() == 24 && *set == sets[0]));
-                // Mirrored and turned windows differ in where a pixel goes.
+                // Rotated and reflected windows differ in the positions of their pixels.
                 assert_eq!(turns.iter().collect::<BTreeSet<_>>().len(), 8);
             }
             assert!(sets.iter().all(|set| set.len() >= 14), "{plane}: {}", sets[0].len());

@@ -1,13 +1,12 @@
-//! Solids grown around measurements: what is given stays, what is grown is the exemplar's, the same at any number of threads.
+//! Solids grown around measurements: measurements are kept, grown voxels are texels of the exemplar, and the result does not depend on the number of threads.
 
 use ndarray::{Array3, Array4};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
-use stereology_exemplar::grow::{
-    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, finish, grow, grow_picture,
-    synthesize_by_levels,
+use stereology_grow::{
+    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, grow, grow_picture, synthesize_by_levels,
 };
 use stereology_metrics::seams;
 use stereology_shape::{ClosedMesh, TriangleMesh};
@@ -35,7 +34,7 @@ fn grown(mask: &Array3<bool>, measured: &[([usize; 3], Vec<f32>)], options: &Gro
     grow(mask.view(), stone(64).view(), measured, options, &go).unwrap()
 }
 
-/// A ball of a mesh has the ball's volume, and its voxels are those of the ball.
+/// The voxels of a spherical mesh have the sphere's volume and its symmetry.
 #[test]
 fn voxels_are_the_centres_inside() {
     let mesh = ClosedMesh::try_from(TriangleMesh::icosphere(2.0, 4)).unwrap();
@@ -46,14 +45,14 @@ fn voxels_are_the_centres_inside() {
     let turned: Vec<bool> = straight.iter().rev().copied().collect();
     assert!(
         turned.iter().zip(&straight).filter(|(a, b)| a != b).count() < 40,
-        "a ball is its mirror image"
+        "a ball is symmetric"
     );
     let centre = nalgebra::Point3::new(0.01, 0.01, 0.01);
     assert_eq!(voxels.voxel_at(&centre), Some([20, 20, 20]));
-    let (near, off) = voxels
+    let (near, distance) = voxels
         .nearest_inside(&nalgebra::Point3::new(1.0, 0.0, 0.0), 2.0)
         .unwrap();
-    assert!(voxels.inside[near] && off < 1.5);
+    assert!(voxels.inside[near] && distance < 1.5);
     assert!(
         voxels
             .nearest_inside(&nalgebra::Point3::new(1.5, 0.0, 0.0), 2.0)
@@ -67,7 +66,7 @@ fn voxels_are_the_centres_inside() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Whatever is measured wherever stays to the bit; everything inside is filled with texels of the exemplar, nothing outside is touched.
+    /// Measured values are kept to the bit at any place; every other voxel inside is a texel of the exemplar, and voxels outside stay 0.
     #[test]
     fn measurements_stay_and_the_mask_is_filled(
         places in prop::collection::btree_map((0_usize..12, 0_usize..12, 0_usize..12), 0_u8..255, 0..20),
@@ -117,7 +116,7 @@ fn the_same_at_any_number_of_threads() {
     assert_ne!(one.values, with(1, &options.with_seed(1)).values);
 }
 
-/// Connected measurements are one seed; parts of a mask without a seed get one and are told.
+/// Connected measurements are one seed; components of a mask without a seed get one and are counted.
 #[test]
 fn cells_are_counted() {
     let mut mask = Array3::from_elem((6, 6, 13), true);
@@ -132,7 +131,7 @@ fn cells_are_counted() {
     assert_eq!(made.labels[[0, 0, 0]], made.labels[[1, 1, 1]]);
 }
 
-/// The tree finds nearly what comparing every window finds.
+/// The tree finds nearly the distances that comparing every window finds.
 #[test]
 fn the_tree_is_nearly_exact() {
     let mask = Array3::from_elem((16, 16, 16), true);
@@ -147,7 +146,7 @@ fn the_tree_is_nearly_exact() {
     );
 }
 
-/// Windows make neighbours alike: the wider, the less a seam shows; with the histogram alone there is no texture that a seam could break.
+/// Windows make neighbouring voxels similar, and cells show seams; with the histogram alone there is no texture, so there are no seams.
 #[test]
 fn windows_make_texture() {
     let mask = Array3::from_elem((24, 24, 24), true);
@@ -161,43 +160,9 @@ fn windows_make_texture() {
     assert!(textured.visibility().unwrap() > 1.0);
 }
 
-/// A finishing pass removes the seams of cells; measurements and what lies outside the mask stay, and all else is still the exemplar's.
+/// All channels of a voxel (such as chemistry) come from one texel.
 #[test]
-fn finishing_removes_seams() {
-    let mask = Array3::from_shape_fn((24, 24, 24), |(z, y, x)| z + y + x < 60);
-    let measured: Vec<_> = (0..8)
-        .map(|i| ([2 + i, 20 - 2 * i, (7 * i) % 20], vec![(31 * i) as f32 + 0.5]))
-        .collect();
-    let made = grown(&mask, &measured, &GrowOptions::default().with_window(3));
-    let finished = finish(&made, mask.view(), stone(64).view(), &measured, 5, 0, &go).unwrap();
-    let visible = |made: &Grown| seams(made.values.view(), made.labels.view()).visibility().unwrap();
-    let (before, after) = (visible(&made), visible(&finished));
-    assert!(
-        before > 1.3 && (after - 1.0).abs() < 0.4 * (before - 1.0),
-        "{before} {after}"
-    );
-    assert_eq!((finished.fixed_changed, &finished.labels), (0, &made.labels));
-    for ((z, y, x), inside) in mask.indexed_iter() {
-        let value = finished.values[[z, y, x, 0]];
-        let given = measured.iter().find(|(at, _)| *at == [z, y, x]);
-        let right = match (inside, given) {
-            (false, _) => value == 0.0,
-            (true, Some((_, v))) => value == v[0],
-            (true, None) => [20.0, 120.0, 220.0].contains(&value),
-        };
-        assert!(right, "{z} {y} {x}: {value}");
-    }
-    let tiny = Array3::from_shape_fn((7, 7, 1), |(y, x, _)| (y * x) as f32);
-    let stopped = finish(&made, mask.view(), tiny.view(), &[], 1, 0, &go);
-    assert!(
-        matches!(stopped, Err(GrowError::ExemplarTooSmall { window: 7, .. })),
-        "{stopped:?}"
-    );
-}
-
-/// Several channels (chemistry) go together: a voxel's channels are those of one texel.
-#[test]
-fn channels_belong_together() {
+fn channels_come_from_one_texel() {
     let grey = stone(48);
     let both = Array3::from_shape_fn((48, 48, 2), |(y, x, c)| {
         grey[[y, x, 0]] * if c == 0 { 1.0 } else { -0.01 }
@@ -223,9 +188,9 @@ fn channels_belong_together() {
     ));
 }
 
-/// What cannot be grown is said.
+/// Invalid inputs are refused with the error that describes them.
 #[test]
-fn what_cannot_be_grown_is_refused() {
+fn invalid_inputs_are_refused() {
     let mask = Array3::from_elem((4, 4, 4), true);
     let picture = stone(16);
     let refused =
@@ -287,9 +252,9 @@ fn what_cannot_be_grown_is_refused() {
     ));
 }
 
-/// Pictures: every pixel is one of the exemplar, and a picture of its own size is not the exemplar.
+/// Every pixel of a grown image is a texel of the exemplar.
 #[test]
-fn pictures_are_made_of_texels() {
+fn images_are_made_of_texels() {
     let exemplar = stone(50);
     let one = grow_picture(exemplar.view(), [40, 60], &GrowOptions::default().with_window(7), &go).unwrap();
     let other = synthesize_by_levels(exemplar.view(), [40, 60], &LevelOptions::default(), &go).unwrap();

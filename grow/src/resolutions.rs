@@ -1,29 +1,28 @@
-//! Pictures from coarse to fine with a fixed neighbourhood (Wei and Levoy): the fast relative of growing.
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "texels, voxels and cells are fewer than 2^32: `grow` refuses more"
-)]
+//! Multiresolution synthesis of images with a fixed neighbourhood (Wei and Levoy), which is faster than growing.
 
-use super::growth::{check_exemplar, pick};
-use super::patch_tree::{Known, PatchTree};
-use super::{GrowError, Search};
 use ndarray::{Array3, ArrayView3, Axis, concatenate};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 
-/// How to go from coarse to fine.
+use crate::error::GrowError;
+use crate::exemplar::check_exemplar;
+use crate::numbers::{MOST, chosen, number};
+use crate::patch_tree::{Known, PatchTree};
+use crate::search::Search;
+
+/// How an image is synthesised by levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelOptions {
-    /// Resolutions, each half the one before.
+    /// Number of resolutions, each half of the one before.
     pub levels: usize,
-    /// Side of the neighbourhood, of which the half above and to the left is known: odd, 3 to 15.
+    /// Side of the neighbourhood, odd, 3 to 15; its half above and to the left is known.
     pub window: usize,
-    /// How neighbourhoods are looked for.
+    /// How similar neighbourhoods are searched for.
     pub search: Search,
-    /// One is taken at random among those whose distance is at most 1 + this times the least.
+    /// One of the neighbourhoods whose distance is at most 1 + this number times the least distance is chosen at random.
     pub tolerance: f32,
-    /// Everything random.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
@@ -41,7 +40,7 @@ impl Default for LevelOptions {
 }
 
 impl LevelOptions {
-    /// With so many levels.
+    /// With `levels` levels.
     #[must_use]
     pub fn with_levels(self, levels: usize) -> Self {
         Self { levels, ..self }
@@ -60,8 +59,8 @@ impl LevelOptions {
     }
 }
 
-/// A picture of `height` × `width` pixels that repeats without a seam, made row by row at each of several resolutions: every pixel looks at the half window above and to the left, which is always known, and at the
-/// 3 × 3 pixels about its place one level coarser.
+/// An image of `height` × `width` pixels that repeats without a seam, made row by row at each of several resolutions. Every pixel is chosen by the half window above and to the left, which is always known, and by the
+/// 3 × 3 pixels about its position one level coarser.
 ///
 /// # Errors
 ///
@@ -69,26 +68,26 @@ impl LevelOptions {
 ///
 /// # References
 ///
-/// Wei & Levoy 2000, 2001; the multiresolution variant that Stone et al. 2014, section 3, name.
+/// Wei & Levoy 2000, 2001; the multiresolution variant mentioned by Stone et al. 2014, section 3.
 ///
 /// # Examples
 ///
 /// ```
 /// use ndarray::Array3;
 /// use std::ops::ControlFlow;
-/// use stereology_exemplar::grow::{LevelOptions, synthesize_by_levels};
+/// use stereology_grow::{LevelOptions, synthesize_by_levels};
 ///
 /// let board = Array3::from_shape_fn((32, 32, 1), |(y, x, _)| ((y / 4 + x / 4) % 2) as f32);
 /// let made = synthesize_by_levels(board.view(), [40, 40], &LevelOptions::default(), &|_| ControlFlow::Continue(()))?;
 /// assert_eq!(made.dim(), (40, 40, 1));
 /// assert!(made.iter().all(|v| *v == 0.0 || *v == 1.0)); // only pixels of the exemplar
-/// # Ok::<(), stereology_exemplar::grow::GrowError>(())
+/// # Ok::<(), stereology_grow::GrowError>(())
 /// ```
 pub fn synthesize_by_levels(
     exemplar: ArrayView3<'_, f32>,
     [height, width]: [usize; 2],
     options: &LevelOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Array3<f32>, GrowError> {
     if options.window == 0 {
         return Err(GrowError::Window { window: 0 });
@@ -97,8 +96,11 @@ pub fn synthesize_by_levels(
     if height == 0 || width == 0 {
         return Err(GrowError::EmptyMask);
     }
+    if height.checked_mul(width).is_none_or(|pixels| pixels >= MOST) {
+        return Err(GrowError::TooLarge);
+    }
     let (rows, columns, _) = exemplar.dim();
-    // A level coarser, a pixel stands for two; the window must fit twice, or there is nothing to choose from.
+    // One level coarser a pixel stands for two along each axis. More than one window must fit, so that there is a choice.
     let most = (1..)
         .take_while(|level| rows.min(columns) >> (level - 1) > options.window)
         .last()
@@ -120,7 +122,7 @@ pub fn synthesize_by_levels(
     for level in (0..options.levels).rev() {
         let size = [height, width].map(|n| n.div_ceil(1 << level));
         let own = &exemplars[level];
-        // The coarser level beside the fine one, as further channels.
+        // The coarser level is added to the fine one as further channels.
         let (both, parent) = match &coarser {
             None => (own.clone(), None),
             Some((exemplar, made)) => {
@@ -144,7 +146,7 @@ fn one_level(
     [height, width]: [usize; 2],
     level: usize,
     options: &LevelOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Array3<f32>, GrowError> {
     let (rows, columns, channels) = exemplar.dim();
     let samples = both.dim().2;
@@ -152,7 +154,7 @@ fn one_level(
     let tree = PatchTree::new(both.view(), reach);
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     rng.set_stream(2 + level as u64);
-    let mut sources = ndarray::Array2::from_shape_fn((height, width), |_| rng.random_range(0..(rows * columns) as u32));
+    let mut sources = ndarray::Array2::from_shape_fn((height, width), |_| rng.random_range(0..number(rows * columns)));
     let mut made = Array3::zeros((height, width, channels));
     let copy = |made: &mut Array3<f32>, y: usize, x: usize, texel: u32| {
         let from = exemplar.index_axis(Axis(0), texel as usize / columns);
@@ -166,9 +168,9 @@ fn one_level(
     let side = options.window;
     let (mut known, mut beside, mut found) = (Vec::new(), Vec::new(), Vec::new());
     for y in 0..height {
-        // A step of progress a row, the finest level most of it.
-        let share = (y as f64 / height as f64 + 1.0 / 3.0) / f64::powi(4.0, i32::try_from(level).unwrap_or(30));
-        if progress(share.min(1.0)).is_break() {
+        // Progress is reported for every row; the finest level takes most of the time.
+        let done = (y as f64 / height as f64 + 1.0 / 3.0) / f64::powi(4.0, i32::try_from(level).unwrap_or(30));
+        if progress(done.min(1.0)).is_break() {
             return Err(GrowError::Cancelled);
         }
         for x in 0..width {
@@ -176,7 +178,7 @@ fn one_level(
             beside.clear();
             for pixel in 0..side * side {
                 let (v, u) = (pixel / side, pixel % side);
-                // The output repeats; above it, at first, is the noise it began as.
+                // The output repeats; the pixels above its first rows are still the initial noise.
                 let at = [
                     (y + height * side + v - reach) % height,
                     (x + width * side + u - reach) % width,
@@ -209,8 +211,8 @@ fn one_level(
             beside.sort_unstable();
             beside.dedup();
             let salt = rng.random::<u32>();
-            tree.like(&known, &beside, options.search, options.tolerance, salt, &mut found);
-            let texel = found[pick(rng.random::<f32>(), found.len())].1;
+            tree.similar(&known, &beside, options.search, options.tolerance, salt, &mut found);
+            let texel = found[chosen(rng.random::<f32>(), found.len())].1;
             sources[[y, x]] = texel;
             copy(&mut made, y, x, texel);
         }
@@ -218,19 +220,19 @@ fn one_level(
     Ok(made)
 }
 
-/// Half the resolution: means of 2 × 2; a last odd row or column is left out.
-fn halved(picture: &Array3<f32>) -> Array3<f32> {
-    let (height, width, channels) = picture.dim();
+/// Half the resolution: means of 2 × 2 pixels; a last odd row or column is left out.
+fn halved(image: &Array3<f32>) -> Array3<f32> {
+    let (height, width, channels) = image.dim();
     Array3::from_shape_fn((height / 2, width / 2, channels), |(y, x, c)| {
-        let at = |dy: usize, dx: usize| picture[[2 * y + dy, 2 * x + dx, c]];
+        let at = |dy: usize, dx: usize| image[[2 * y + dy, 2 * x + dx, c]];
         (at(0, 0) + at(0, 1) + at(1, 0) + at(1, 1)) / 4.0
     })
 }
 
-/// Twice the resolution, each pixel four times, cut or continued to `size`.
-fn doubled(picture: &Array3<f32>, [height, width]: [usize; 2]) -> Array3<f32> {
-    let (rows, columns, channels) = picture.dim();
+/// Twice the resolution, each pixel four times, cropped or continued to the given size.
+fn doubled(image: &Array3<f32>, [height, width]: [usize; 2]) -> Array3<f32> {
+    let (rows, columns, channels) = image.dim();
     Array3::from_shape_fn((height, width, channels), |(y, x, c)| {
-        picture[[(y / 2).min(rows - 1), (x / 2).min(columns - 1), c]]
+        image[[(y / 2).min(rows - 1), (x / 2).min(columns - 1), c]]
     })
 }

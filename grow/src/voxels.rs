@@ -1,11 +1,11 @@
-//! A closed mesh as voxels.
+//! The voxels of a closed mesh.
 
-use super::GrowError;
 use nalgebra::{Point3, Vector3};
-use ndarray::{Array3, ArrayView3};
+use ndarray::Array3;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use stereology_shape::{ClosedMesh, InsideTest};
+
+use crate::error::GrowError;
 
 /// The voxels whose centres lie inside a mesh, and where they are.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +19,8 @@ pub struct Voxels {
 }
 
 impl Voxels {
-    /// `resolution` voxels along the longest side of the mesh's box; the shorter sides get as many whole voxels as hold them, centred. Exact for every centre; points on the surface are outside.
-    /// Cost: about a microsecond a voxel of the box and core.
+    /// The mesh with `resolution` voxels along the longest side of its box; the shorter sides get the smallest number of whole voxels that covers them, centred. Exact for every centre; points on the surface are
+    /// outside. Cost: about a microsecond per voxel of the box and core.
     ///
     /// # Errors
     ///
@@ -29,7 +29,7 @@ impl Voxels {
     /// # Examples
     ///
     /// ```
-    /// use stereology_exemplar::grow::Voxels;
+    /// use stereology_grow::Voxels;
     /// use stereology_shape::{ClosedMesh, TriangleMesh};
     ///
     /// let brick = ClosedMesh::try_from(TriangleMesh::cuboid([4.0, 2.0, 1.0]))?;
@@ -51,7 +51,7 @@ impl Voxels {
         let (low, high) = mesh.as_triangle_mesh().bounding_box().ok_or(GrowError::EmptyMask)?;
         let sides = high - low;
         let spacing = sides.max() / resolution as f64;
-        // Rounding must not add a voxel to a side that is a whole number of them.
+        // Rounding must not add a voxel to a side that is a whole number of voxels.
         let counts = sides.map(|side| (side / spacing - 1e-9).ceil().clamp(1.0, resolution as f64));
         let origin = nalgebra::center(&low, &high) - counts * (spacing / 2.0);
         let [nx, ny, nz] = [counts.x as usize, counts.y as usize, counts.z as usize];
@@ -77,7 +77,7 @@ impl Voxels {
         })
     }
 
-    /// The voxel (z, y, x) that holds a point, inside or not; `None` beyond the box.
+    /// The voxel (z, y, x) that contains a point, inside the mesh or not; `None` outside the box.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
@@ -91,7 +91,7 @@ impl Voxels {
         Some([index(place.z, nz)?, index(place.y, ny)?, index(place.x, nx)?])
     }
 
-    /// The voxel inside that is nearest to a point by its centre, and that distance in voxels, among those within `reach` voxels; of equally near ones the first.
+    /// The voxel inside whose centre is nearest to a point, and that distance in voxels, among those within `reach` voxels; the first of equally near ones.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
@@ -119,61 +119,4 @@ impl Voxels {
         }
         best
     }
-}
-
-/// Numbers of the connected areas of voxels, from 0 in the order of their first voxel; voxels that share a corner are connected.
-///
-/// ```
-/// use stereology_exemplar::grow::connected_areas;
-///
-/// assert_eq!(connected_areas(&[[0, 0, 0], [5, 5, 5], [0, 1, 1]]), [0, 1, 0]);
-/// ```
-#[must_use]
-pub fn connected_areas(voxels: &[[usize; 3]]) -> Vec<usize> {
-    let places: BTreeMap<[usize; 3], usize> = voxels.iter().enumerate().map(|(i, v)| (*v, i)).collect();
-    let mut areas = vec![usize::MAX; voxels.len()];
-    let mut next = 0;
-    for start in 0..voxels.len() {
-        if areas[start] != usize::MAX {
-            continue;
-        }
-        let mut open = vec![start];
-        areas[start] = next;
-        while let Some(at) = open.pop() {
-            for step in neighbours() {
-                let Some(near) = moved(voxels[at], step) else { continue };
-                if let Some(&other) = places.get(&near).filter(|&&other| areas[other] == usize::MAX) {
-                    areas[other] = next;
-                    open.push(other);
-                }
-            }
-        }
-        next += 1;
-    }
-    // A voxel given twice is in `places` once.
-    for at in 0..voxels.len() {
-        areas[at] = areas[places[&voxels[at]]];
-    }
-    areas
-}
-
-/// The 26 steps to neighbours.
-pub(super) fn neighbours() -> impl Iterator<Item = [isize; 3]> {
-    (0..27)
-        .filter(|step| *step != 13)
-        .map(|step: isize| [step / 9 - 1, step / 3 % 3 - 1, step % 3 - 1])
-}
-
-/// A voxel moved by a step, unless it leaves the box at its low end.
-pub(super) fn moved(voxel: [usize; 3], step: [isize; 3]) -> Option<[usize; 3]> {
-    Some([
-        voxel[0].checked_add_signed(step[0])?,
-        voxel[1].checked_add_signed(step[1])?,
-        voxel[2].checked_add_signed(step[2])?,
-    ])
-}
-
-/// Whether a voxel is in the box and inside the mask.
-pub(super) fn is_inside(mask: &ArrayView3<'_, bool>, voxel: [usize; 3]) -> bool {
-    mask.get(voxel).copied().unwrap_or(false)
 }

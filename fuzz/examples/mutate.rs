@@ -1,5 +1,5 @@
-//! Random changes of small mesh files and of raw meshes, for so many seconds: `mutate [SECONDS] [SEED]`. A case that fails is left in
-//! `mutate-failure.bin`, the target's name first.
+//! Random changes of small mesh files and of raw meshes, for so many seconds: `mutate [SECONDS] [SEED]`. A case that
+//! fails is left in `mutate-failure.bin`, the target's name first.
 
 use std::panic::catch_unwind;
 use std::time::{Duration, Instant};

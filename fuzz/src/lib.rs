@@ -1,8 +1,9 @@
 //! What may be asked of any bytes: an error or a result, never a panic, a hang or a number that is none.
 //!
-//! `cargo +nightly fuzz run mesh_file --features libfuzzer` (cargo-fuzz; `-s none` without sanitizers) drives these functions with coverage, from the
-//! small corpus beside; `cargo run --release --example mutate -- SECONDS` drives them with random changes of small meshes, and needs neither.
-//! `cargo run --release --example replay -- corpus/*/*` runs the corpus, former failures among it.
+//! `cargo +nightly fuzz run mesh_file --features libfuzzer` (cargo-fuzz; `-s none` without sanitizers) drives these
+//! functions with coverage, from the small corpus beside; `cargo run --release --example mutate -- SECONDS` drives them
+//! with random changes of small meshes, and needs neither. `cargo run --release --example replay -- corpus/*/*` runs
+//! the corpus, former failures among it.
 
 use std::path::Path;
 
@@ -32,8 +33,8 @@ pub fn mesh_file(bytes: &[u8]) {
     }
 }
 
-/// Takes the bytes for a mesh: how many vertices, coordinates of a byte each (so that many lie in common planes, on common lines and at
-/// common places) or of eight, and triangles of three bytes.
+/// Takes the bytes for a mesh: how many vertices, coordinates of a byte each (so that many lie in common planes, on
+/// common lines and at common places) or of eight, and triangles of three bytes.
 pub fn sweep(bytes: &[u8]) {
     let [count, kind, rest @ ..] = bytes else { return };
     let wide = kind % 4 == 0;

@@ -1,17 +1,19 @@
-//! A file that appears whole or not at all: written as `FILE.partial`, renamed to `FILE`.
+//! A file that appears complete or not at all: written as `FILE.partial`, renamed to `FILE`.
 
-use crate::GridError;
+use crate::error::GridError;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Small writes are gathered; larger ones, as of most slabs, go past the buffer.
+/// Bytes of the write buffer. Most slabs are larger and bypass it.
 const BUFFER: usize = 1 << 16;
 
-/// Writes a file so that it appears under its name only when it is whole.
+/// Writes a file that appears under its name only when it is complete.
 ///
-/// `write` fills `FILE.partial` beside it, which is then renamed, replacing any file of that name. If `write` or the system fails, `FILE.partial` is removed and an older `FILE` stays as it was. A killed process may leave
-/// `FILE.partial`; the next call overwrites it. The bytes are handed to the operating system, not forced to the platter.
+/// `write` fills `FILE.partial` in the same folder, which is then renamed and replaces any file of that name. If
+/// `write` or the system fails, `FILE.partial` is removed and an older `FILE` stays unchanged. A killed process may
+/// leave `FILE.partial`; the next call overwrites it. The bytes are passed to the operating system; no sync to disk is
+/// forced.
 ///
 /// # Errors
 ///
@@ -26,8 +28,8 @@ const BUFFER: usize = 1 << 16;
 /// stereology_grid::write_atomically(&file, |out| out.write_all(b"42"))?;
 /// let refused = stereology_grid::write_atomically(&file, |_| Err(std::io::Error::other("no answer")));
 /// assert!(refused.is_err());
-/// assert_eq!(std::fs::read(&file)?, b"42"); // as it was
-/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 1); // and nothing beside it
+/// assert_eq!(std::fs::read(&file)?, b"42"); // unchanged
+/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 1); // no partial file is left
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn write_atomically(
@@ -40,7 +42,7 @@ pub fn write_atomically(
     partial.publish()
 }
 
-/// `FILE.partial` while it is being written; removed when dropped before it was published, unless it is to be kept.
+/// `FILE.partial` while it is being written; removed if dropped before it is published, unless it is to be kept.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
     path: PathBuf,
@@ -64,7 +66,7 @@ impl PartialFile {
         Ok(Self::new(path, partial, file, false))
     }
 
-    /// What is there already, or a new one; kept when dropped.
+    /// The existing partial file, or a new one; kept when dropped.
     pub(crate) fn reopen(path: &Path) -> Result<Self, GridError> {
         refuse_folder(path)?;
         let partial = partial_name(path);
@@ -93,7 +95,7 @@ impl PartialFile {
             .expect("the writer is taken only by publish and drop")
     }
 
-    /// Throws away everything from `length` on and goes on there.
+    /// Truncates the file to `length` bytes and continues there.
     pub(crate) fn cut_to(&mut self, length: u64) -> Result<(), GridError> {
         let path = self.path.clone();
         let file = self.writer().get_mut();
@@ -115,7 +117,7 @@ impl PartialFile {
 
 fn refuse_folder(path: &Path) -> Result<(), GridError> {
     if path.is_dir() {
-        // Said now, not after an hour when the rename fails.
+        // Refused now: otherwise the rename fails after an hour of work.
         return Err(GridError::io(path)(io::Error::new(
             io::ErrorKind::IsADirectory,
             "is a folder; give the name of a file",
@@ -126,13 +128,13 @@ fn refuse_folder(path: &Path) -> Result<(), GridError> {
 
 impl Drop for PartialFile {
     fn drop(&mut self) {
-        // There is nobody to tell if the flush or the removal fails.
+        // A failed flush or removal cannot be reported from here.
         match self.writer.take() {
             Some(mut writer) if self.keep => {
                 let _ = writer.flush();
             }
             Some(writer) => {
-                // Closed without flushing what is to be thrown away.
+                // Closed without flushing, as the file is removed.
                 drop(writer.into_parts());
                 let _ = fs::remove_file(&self.partial);
             }

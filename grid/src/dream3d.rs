@@ -1,8 +1,8 @@
-//! The layout of DREAM.3D files, version 7: an image geometry and one array of its cells.
+//! The layout of DREAM.3D files, version 7: an image geometry and one array of cell data.
 
-use crate::VolumeShape;
 use crate::element::Element;
 use crate::hdf5::{Attribute, Data, Object, Type, head as hdf5_head};
+use crate::volume_shape::VolumeShape;
 
 /// Everything before the samples.
 pub(crate) fn head<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> Vec<u8> {
@@ -56,7 +56,7 @@ pub(crate) fn head<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u6
 
 fn geometry(counts: [u64; 3], spacing: [f64; 3]) -> Object {
     let number = |name, value: u32| Attribute::array(name, Type::Unsigned(4), value.to_le_bytes().to_vec());
-    #[allow(clippy::cast_possible_truncation, reason = "DREAM.3D has f32 here")]
+    #[allow(clippy::cast_possible_truncation, reason = "DREAM.3D stores f32 here")]
     let floats = |values: [f64; 3]| values.iter().flat_map(|&value| (value as f32).to_le_bytes()).collect();
     let array = |of, bytes| Object::Array {
         attributes: Vec::new(),

@@ -1,18 +1,18 @@
-//! The sample types of our volumes and what each format calls them.
+//! The sample types of volumes and their names in each format.
 
 use crate::hdf5::Type;
 use std::io::{self, Write};
 
 /// A sample type of a volume: `u8` (colours, categories), `u32` (ids), `f32` (distances, residuals).
 ///
-/// Sealed: the formats agree on these three.
+/// Sealed: all formats support these three.
 pub trait Element: Encoded {}
 
 impl Element for u8 {}
 impl Element for u32 {}
 impl Element for f32 {}
 
-/// What the formats call a sample type, and its little-endian bytes.
+/// The names of a sample type in the formats, and its little-endian bytes.
 pub trait Encoded: Copy + Default + PartialEq + Send + Sync + 'static {
     /// NumPy's type descriptor.
     const NPY: &'static str;
@@ -30,13 +30,13 @@ pub trait Encoded: Copy + Default + PartialEq + Send + Sync + 'static {
     const HDF5: Type;
     /// The type in DREAM.3D.
     const DREAM3D: &'static str;
-    /// What DREAM.3D calls an array of one such sample a cell.
+    /// DREAM.3D's name of an array with one such sample per cell.
     const CELLS: &'static str;
     /// Writes the samples as little-endian bytes.
     fn write(samples: &[Self], out: &mut dyn Write) -> io::Result<()>;
-    /// The samples of little-endian bytes; a rest shorter than a sample is left out.
+    /// The samples of little-endian bytes; a remainder shorter than a sample is ignored.
     fn decode(bytes: &[u8]) -> Vec<Self>;
-    /// One sample for several of a finer grid: the mean, rounded.
+    /// One sample for several of a finer grid: the rounded mean, or of ids the first.
     fn mean(samples: &[Self]) -> Self;
 }
 
@@ -107,7 +107,7 @@ macro_rules! four_bytes {
     };
 }
 
-// DREAM.3D takes ids as i32: the same bytes below 2^31.
+// DREAM.3D reads ids as i32: the same bytes below 2^31.
 four_bytes!(
     u32,
     "<u4",

@@ -1,48 +1,48 @@
-//! What can go wrong with an array in a file.
+//! Errors of reading and writing arrays.
 
-use crate::Format;
+use crate::format::Format;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why an array could not be written or read; the message says what, where and what to do.
+/// Why an array could not be written or read. The message names the file, the cause and a remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file that was asked for (not its `.partial`).
+        /// The requested file (not its `.partial`).
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The callback broke off; nothing was left on disk, but the partial volume where it is to be gone on with.
+    /// The callback cancelled the work. Nothing is left on disk, except the partial volume of a resumable call.
     #[error("cancelled")]
     Cancelled,
-    /// What lies half-written is the beginning of another volume.
-    #[error("{}: begins another volume than the one asked for; remove it, or do not resume", partial.display())]
+    /// The partial file is the beginning of another volume.
+    #[error("{}: is the beginning of another volume; remove it, or do not resume", partial.display())]
     OtherPartial {
-        /// The half-written file.
+        /// The partial file.
         partial: PathBuf,
     },
-    /// The extension names no format of ours.
+    /// The extension names no known format.
     #[error("{}: unknown format; use .npy, .nrrd, .vti, .tif, .h5 or .zarr", path.display())]
     UnknownFormat {
-        /// The path whose extension it was.
+        /// The path with that extension.
         path: PathBuf,
     },
-    /// The extension names no format that is read.
+    /// The extension names no format that can be read.
     #[error("{}: volumes are read from .npy, .nrrd and .tif; convert it", path.display())]
     UnreadableFormat {
-        /// The path whose extension it was.
+        /// The path with that extension.
         path: PathBuf,
     },
-    /// The file holds no volume that can be understood.
+    /// The file contains no readable volume.
     #[error("{}: {reason}", path.display())]
     NotVolume {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it and what to do.
+        /// The fault, and a remedy.
         reason: String,
     },
     /// One of the sizes is zero.
@@ -54,11 +54,11 @@ pub enum GridError {
         ny: usize,
         /// Voxels along z.
         nz: usize,
-        /// Channels of a voxel.
+        /// Channels per voxel.
         channels: usize,
     },
-    /// The number of bytes does not fit in 64 bits.
-    #[error("{nx} x {ny} x {nz} voxels of {channels} channels cannot be counted in 64 bits; ask for fewer voxels")]
+    /// The number of bytes exceeds 64 bits.
+    #[error("{nx} x {ny} x {nz} voxels of {channels} channels exceed what 64 bits can count; request fewer voxels")]
     Uncountable {
         /// Voxels along x.
         nx: usize,
@@ -66,31 +66,31 @@ pub enum GridError {
         ny: usize,
         /// Voxels along z.
         nz: usize,
-        /// Channels of a voxel.
+        /// Channels per voxel.
         channels: usize,
     },
-    /// The disk has no room for the file.
-    #[error("{}: needs {needed} bytes of disk but {free} are free there; ask for fewer voxels", path.display())]
+    /// The disk has too little free space.
+    #[error("{}: needs {needed} bytes of disk but {free} are free there; request fewer voxels", path.display())]
     NoRoom {
-        /// The file that was asked for.
+        /// The requested file.
         path: PathBuf,
         /// Bytes of the whole file.
         needed: u64,
-        /// Bytes free on its file system.
+        /// Free bytes on its file system.
         free: u64,
     },
     /// One slab does not fit in memory.
-    #[error("one slab needs {bytes} bytes of memory, more than there is; ask for fewer voxels in x and y")]
+    #[error("one slab needs {bytes} bytes of memory, more than there is; request fewer voxels in x and y")]
     SlabTooLarge {
         /// Bytes of one slab.
         bytes: u64,
     },
-    /// The format cannot hold so many channels.
+    /// The format cannot store this number of channels.
     #[error("{format} holds 1 or 3 channels, not {channels}; use .npy or .nrrd")]
     Channels {
-        /// The format asked for.
+        /// The requested format.
         format: Format,
-        /// The channels asked for.
+        /// The requested number of channels.
         channels: usize,
     },
     /// A spacing is not a positive number.
@@ -99,12 +99,12 @@ pub enum GridError {
         /// Spacing along x, y, z.
         spacing: [f64; 3],
     },
-    /// The file is not the array that was asked for.
+    /// The file is not a `.npy` array of the requested type.
     #[error("{}: {reason}", path.display())]
     NotNpy {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it and what to do.
+        /// The fault, and a remedy.
         reason: String,
     },
 }

@@ -1,9 +1,12 @@
-//! A file of raw samples: what stands before them and what behind.
+//! A file of raw samples: the bytes before and after them.
 //!
-//! Where the two depend on shape, type and spacing alone, a file can be written slab by slab and, broken off, gone on with: its length tells how far it came.
+//! Both depend only on shape, type and spacing. So a file can be written slab by slab, and an interrupted write can be
+//! resumed: the length of the file gives the number of complete slabs.
 
 use crate::element::Element;
-use crate::{Format, VolumeShape, dream3d, npy, nrrd, tiff_stack, vti};
+use crate::format::Format;
+use crate::volume_shape::VolumeShape;
+use crate::{dream3d, npy, nrrd, tiff_stack, vti};
 
 /// The bytes around the samples.
 #[derive(Debug)]
@@ -13,7 +16,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// The frame of a volume of `bytes` bytes; `None` for a format that is no file of raw samples.
+    /// The frame of a volume of `bytes` bytes; `None` for a format that is not one file of raw samples.
     pub(crate) fn of<T: Element>(format: Format, shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> Option<Self> {
         let (head, tail) = match format {
             Format::Npy => (npy::header::<T>(shape), Vec::new()),
@@ -26,7 +29,7 @@ impl Frame {
         Some(Self { head, tail })
     }
 
-    /// Bytes of both.
+    /// Bytes of head and tail.
     pub(crate) fn length(&self) -> u64 {
         (self.head.len() + self.tail.len()) as u64
     }

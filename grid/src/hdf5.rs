@@ -1,22 +1,24 @@
-//! HDF5 files of groups, attributes and contiguous arrays, one of which may follow behind: all that a volume needs, in the format's second version.
+//! HDF5 files of groups, attributes and contiguous arrays, one of which may follow after everything else.
 //!
-//! Written here because a volume larger than memory must be written as it comes, which the pure-Rust libraries do not do, and because 200 lines are all it takes. Source: HDF5 File Format Specification, version 3.0, sections
-//! II.A (superblock 2), IV.A.1.b (object header 2) and IV.A.2 (messages).
+//! This is all that a volume needs, in the second version of the format. It is written here because a volume larger
+//! than memory must be written slab by slab, which the pure-Rust libraries do not offer, and because it takes 200 lines
+//! only. Source: HDF5 File Format Specification, version 3.0, sections II.A (superblock 2), IV.A.1.b (object header 2)
+//! and IV.A.2 (messages).
 
-/// What an array or attribute holds.
+/// Type of the values of an array or attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
-    /// Whole numbers from 0, of these bytes.
+    /// Unsigned integers of this many bytes.
     Unsigned(u8),
-    /// Whole numbers of either sign, of these bytes.
+    /// Signed integers of this many bytes.
     Signed(u8),
-    /// IEEE numbers of 32 bits.
+    /// IEEE floating-point numbers of 32 bits.
     Float32,
-    /// Characters, the closing zero included.
+    /// Text of this many bytes, the final zero included.
     Text(u32),
 }
 
-/// A value with a name beside an object.
+/// A named value attached to an object.
 #[derive(Debug)]
 pub(crate) struct Attribute {
     name: &'static str,
@@ -46,7 +48,7 @@ impl Attribute {
     }
 }
 
-/// A folder of the file, or an array in it.
+/// A group of the file, or an array in it.
 #[derive(Debug)]
 pub(crate) enum Object {
     Group {
@@ -66,13 +68,13 @@ pub(crate) enum Object {
 pub(crate) enum Data {
     /// In the head.
     Here(Vec<u8>),
-    /// These many bytes, behind the head.
+    /// This many bytes after the head.
     Behind(u64),
 }
 
-/// Everything before the samples that are [`Data::Behind`]. A multiple of 8 bytes.
+/// Everything before the samples that are [`Data::Behind`]; its length is a multiple of 8 bytes.
 pub(crate) fn head(root: &Object, behind: u64) -> Vec<u8> {
-    // Addresses have a fixed size: the length is known before they are.
+    // Addresses have a fixed size, so the length does not depend on their values.
     let length = file(root, 0, behind).len() as u64;
     file(root, length, behind)
 }
@@ -92,7 +94,7 @@ fn file(root: &Object, data: u64, behind: u64) -> Vec<u8> {
     out
 }
 
-/// Appends an object with all it holds, and says where its header is.
+/// Appends an object with all its members, and returns the address of its header.
 fn write(object: &Object, data: u64, out: &mut Vec<u8>) -> u64 {
     let mut messages = Vec::new();
     let attributes = match object {
@@ -120,7 +122,7 @@ fn write(object: &Object, data: u64, out: &mut Vec<u8>) -> u64 {
             };
             messages.push((DATASPACE, dataspace(sizes)));
             messages.push((DATATYPE, of.encoded()));
-            messages.push((FILL_VALUE, vec![3, 0x0a])); // none given: zero
+            messages.push((FILL_VALUE, vec![3, 0x0a])); // undefined: readers use zero
             messages.push((
                 LAYOUT,
                 [&[3, 1][..], &address.to_le_bytes(), &length.to_le_bytes()].concat(),
@@ -148,7 +150,7 @@ const LAYOUT: u8 = 0x08;
 const GROUP_INFO: u8 = 0x0a;
 const ATTRIBUTE: u8 = 0x0c;
 
-/// An object header of version 2 whose messages' length takes four bytes.
+/// An object header of version 2 that stores the length of its messages in four bytes.
 fn header(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
     let mut body = Vec::new();
     for (kind, message) in messages {
@@ -163,7 +165,7 @@ fn header(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
     header
 }
 
-/// Names and messages are ours and far below 64 KiB.
+/// A length as two bytes. All names and messages are written by this crate and far below 64 KiB.
 fn short(length: usize) -> [u8; 2] {
     u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes()
 }
@@ -173,7 +175,7 @@ fn link(name: &str, address: u64) -> Vec<u8> {
     [&[1, 0, length][..], name.as_bytes(), &address.to_le_bytes()].concat()
 }
 
-/// No sizes: one value.
+/// A dataspace message. No sizes mean a single value.
 fn dataspace(sizes: &[u64]) -> Vec<u8> {
     let rank = u8::try_from(sizes.len()).unwrap_or(u8::MAX);
     let mut message = vec![2, rank, 0, u8::from(rank > 0)];
@@ -201,7 +203,8 @@ impl Type {
         match self {
             Self::Unsigned(bytes) => whole(0, bytes),
             Self::Signed(bytes) => whole(8, bytes),
-            // Implied leading bit, sign at bit 31; exponent of 8 bits at 23, fraction of 23 at 0, bias 127.
+            // Implied leading bit, sign at bit 31; exponent of 8 bits at bit 23, fraction of 23 bits at bit 0, bias
+            // 127.
             Self::Float32 => vec![0x11, 0x20, 31, 0, 4, 0, 0, 0, 0, 0, 32, 0, 23, 8, 0, 23, 127, 0, 0, 0],
             Self::Text(length) => [&[0x13, 0, 0, 0][..], &length.to_le_bytes()].concat(),
         }
@@ -220,7 +223,7 @@ impl Attribute {
     }
 }
 
-/// Bob Jenkins' hash of 2006 with initial value 0, the format's checksum.
+/// Bob Jenkins' lookup3 hash (2006) with initial value 0, the checksum of the format.
 fn lookup3(bytes: &[u8]) -> u32 {
     let word = |part: &[u8]| part.iter().rev().fold(0_u32, |word, &byte| word << 8 | u32::from(byte));
     let start = 0xdead_beef_u32.wrapping_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
@@ -261,7 +264,7 @@ fn lookup3(bytes: &[u8]) -> u32 {
 mod tests {
     use super::lookup3;
 
-    /// Values that the author of the hash printed with it.
+    /// Values that the author of the hash published with it.
     #[test]
     fn the_checksum_is_jenkins() {
         assert_eq!(lookup3(b""), 0xdead_beef);

@@ -1,8 +1,10 @@
-//! Arrays in files: NumPy, NRRD, VTK image data, TIFF stacks, HDF5, OME-Zarr; written slab by slab and renamed when whole.
+//! Arrays in files: NumPy, NRRD, VTK image data, TIFF stacks, HDF5, OME-Zarr; written slab by slab and renamed when
+//! complete.
 //!
-//! A solid of 2048³ voxels does not fit in memory and takes an hour to compute. [`write_volume`] asks for one z slab at a time, so memory holds one slab whatever the number of slabs, and writes to
-//! `FILE.partial`, which becomes `FILE` when the last slab is in: a reader never sees half a volume, and an error or a cancelled call leaves nothing behind. [`write_atomically`] gives the same promise to any
-//! other file.
+//! A solid of 2048³ voxels does not fit in memory and takes an hour to compute. [`write_volume`] computes and writes
+//! one z slab at a time, so the memory does not depend on the number of slabs. It writes to `FILE.partial`, which is
+//! renamed to `FILE` after the last slab: a reader never sees half a volume, and an error or a cancelled call leaves
+//! nothing behind. [`write_atomically`] does the same for any other file.
 //!
 //! Every format holds the same samples in the same order: z slowest, then y, then x, then the channel, little-endian.
 //!
@@ -11,13 +13,15 @@
 //! | [`Format::Npy`] | array of shape (nz, ny, nx, channels), or (nz, ny, nx) for one channel | NumPy |
 //! | [`Format::Nrrd`] | sizes `channels nx ny nz`, or `nx ny nz`; voxel centres at (i + ½) spacing | 3D Slicer, pynrrd, ITK |
 //! | [`Format::Vti`] | one cell array, `rgb` for 3 channels, else `values`; the grid spans nx, ny, nz cells from the origin | ParaView, VTK |
-//! | [`Format::Tiff`] | a page a z, with ImageJ's spacing; BigTIFF where 4 GB do not suffice | ImageJ, Fiji, tifffile |
+//! | [`Format::Tiff`] | one page per z slice, with ImageJ's spacing; BigTIFF above 4 GB | ImageJ, Fiji, tifffile |
 //! | [`Format::Hdf5`] | DREAM.3D's image geometry with one cell array (nz, ny, nx, channels): `rgb`, `FeatureIds` of `u32` (as i32: below 2³¹), else `values` | DREAM.3D, h5py |
-//! | [`Format::Zarr`] | OME-Zarr 0.5, arrays (channel, z, y, x) of halved resolutions, 32³ chunks in shards; colours and distances are means, ids and categories are thinned out | napari, zarr-python |
+//! | [`Format::Zarr`] | OME-Zarr 0.5, arrays (channel, z, y, x) of halved resolutions, 32³ chunks in shards; colours and distances are averaged, ids and categories subsampled | napari, zarr-python |
 //!
-//! Voxels are cells, not points: voxel (i, j, k) covers [i, i+1] × [j, j+1] × [k, k+1] times the spacing. In VTK that is cell data, so ids are never interpolated between particles.
+//! Voxels are cells, not points: voxel (i, j, k) covers [i, i+1] × [j, j+1] × [k, k+1] times the spacing. In VTK they
+//! are cell data, so ids are never interpolated between particles.
 //!
-//! [`read_volume`] reads `.npy`, `.nrrd` and `.tif` of any sample type, whichever program wrote them (feature `read`, on by default).
+//! [`read_volume`] reads `.npy`, `.nrrd` and `.tif` of any sample type from any program (feature `read`, on by
+//! default).
 //!
 //! # A ramp, slab by slab
 //!
@@ -39,7 +43,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A text file, whole or not at all
+//! # A text file, complete or absent
 //!
 //! ```
 //! use std::io::Write;
@@ -54,17 +58,21 @@
 //!
 //! # What was rejected
 //!
-//! `vtkio` keeps the spacing as f32; `ndarray-npy` needs the whole array in memory to write it, and asks for the memory a header promises before it looks whether the file holds the data: 60 bytes of a damaged file
-//! abort the program. The HDF5 and Zarr libraries want the whole
-//! array in memory, or a C compiler. So every format is written here, as what stands before the samples and what behind them, which also lets a volume that was broken off be gone on with ([`resume_volume`]); all are checked
-//! with the real readers.
+//! `vtkio` stores the spacing as f32. `ndarray-npy` needs the whole array in memory to write it, and allocates the
+//! memory that a header claims before it checks the length of the file: a damaged file of 60 bytes aborts the program.
+//! The HDF5 and Zarr libraries need the whole array in memory, or a C compiler. So every format is written here as raw
+//! samples between a head and a tail, which also lets an interrupted write be resumed ([`resume_volume`]). The tests
+//! read HDF5, TIFF and .npy back with other crates; all formats were checked with the programs in the table.
 
 mod atomic;
+mod disk_room;
 mod dream3d;
 mod element;
 mod error;
+mod extension;
 mod format;
 mod frame;
+mod framed;
 mod hdf5;
 mod npy;
 mod nrrd;
@@ -78,7 +86,9 @@ mod slabs;
 #[cfg(feature = "read")]
 mod tiff_reader;
 mod tiff_stack;
+mod volume_shape;
 mod vti;
+mod write_volume;
 mod zarr;
 
 pub use atomic::write_atomically;
@@ -90,4 +100,5 @@ pub use npy::read_npy;
 pub use read_volume::{StoredVolume, read_volume};
 #[cfg(feature = "read")]
 pub use sample_type::SampleType;
-pub use slabs::{VolumeShape, resume_volume, write_volume};
+pub use volume_shape::VolumeShape;
+pub use write_volume::{resume_volume, write_volume};

@@ -1,16 +1,17 @@
-//! NumPy's array file: a header of 64-byte multiples, then the samples.
+//! NumPy's array file: a header whose length is a multiple of 64 bytes, then the samples.
 
 use crate::element::Element;
+use crate::error::GridError;
 #[cfg(feature = "read")]
 use crate::sample_type::SampleType;
-use crate::{GridError, VolumeShape};
+use crate::volume_shape::VolumeShape;
 use ndarray::{ArrayD, IxDyn, ShapeBuilder};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// Bytes read at a time, a multiple of every sample's.
+/// Bytes read at a time, a multiple of the size of every sample type.
 const BLOCK: usize = 1 << 17;
 
 /// Header of a C-ordered volume, version 1.0, padded to a multiple of 64 bytes.
@@ -28,13 +29,15 @@ pub(crate) fn header<T: Element>(shape: &VolumeShape) -> Vec<u8> {
     [MAGIC, &[1, 0], &length.to_le_bytes(), text.as_bytes()].concat()
 }
 
-/// Reads a `.npy` file of exactly the sample type `T`, of any number of axes, C or Fortran order.
+/// Reads a `.npy` file of exactly the sample type `T`, with any number of axes, in C or Fortran order.
 ///
-/// The header is checked against the length of the file before memory is asked for, so a damaged file cannot ask for more than it holds.
+/// The header is checked against the length of the file before memory is allocated, so a damaged file cannot request
+/// more than it holds.
 ///
 /// # Errors
 ///
-/// [`GridError::Io`] if the file cannot be read; [`GridError::NotNpy`] if it is no `.npy` file, holds another type or another number of bytes than its header says.
+/// [`GridError::Io`] if the file cannot be read; [`GridError::NotNpy`] if it is no `.npy` file, or holds another type
+/// or another number of bytes than its header states.
 ///
 /// # Examples
 ///
@@ -104,7 +107,8 @@ struct Contents {
 }
 
 impl Contents {
-    /// `sample_size` refuses a type or tells its bytes. The header is checked against the length of the file, so that it cannot make us ask for more memory than that.
+    /// `sample_size` refuses a type or returns its bytes. The header is checked against the length of the file, so that
+    /// no more memory than that is allocated.
     fn open(
         path: &Path,
         wrong: impl Fn(String) -> GridError,
@@ -127,13 +131,13 @@ impl Contents {
                 bytes,
             }),
             _ => Err(wrong(format!(
-                "says {:?} samples of {sample} bytes but holds {bytes} bytes; it is damaged or cut off",
+                "states {:?} samples of {sample} bytes but holds {bytes} bytes; it is damaged or truncated",
                 header.shape
             ))),
         }
     }
 
-    /// Hands over the bytes, block by block of whole samples: all at once would be a second copy of the file in memory.
+    /// Passes the bytes to `take` in blocks of whole samples: all at once would be a second copy of the file in memory.
     fn read(mut self, path: &Path, mut take: impl FnMut(&[u8])) -> Result<Header, GridError> {
         let mut block = vec![0; BLOCK];
         while self.bytes > 0 {
@@ -154,7 +158,7 @@ struct Header {
 }
 
 impl Header {
-    /// Outer error: the file cannot be read; inner: what is wrong with the header.
+    /// Outer error: the file cannot be read. Inner error: what is wrong with the header.
     fn read(reader: &mut impl Read) -> io::Result<Result<Self, String>> {
         let mut start = [0; 10];
         let mut text = Vec::new();
@@ -181,7 +185,7 @@ impl Header {
         }
         length += reader.take(size).read_to_end(&mut text)? as u64;
         let text = String::from_utf8_lossy(&text);
-        Ok(Self::parse(&text, length).ok_or_else(|| "has a header that cannot be understood".to_string()))
+        Ok(Self::parse(&text, length).ok_or_else(|| "has an invalid header".to_string()))
     }
 
     fn parse(text: &str, length: u64) -> Option<Self> {

@@ -1,7 +1,7 @@
-//! NRRD with attached raw data: a header of lines, an empty line, the samples.
+//! NRRD with attached raw data: header lines, an empty line, the samples.
 
-use crate::VolumeShape;
 use crate::element::Element;
+use crate::volume_shape::VolumeShape;
 
 pub(crate) fn header<T: Element>(shape: &VolumeShape, spacing: [f64; 3]) -> Vec<u8> {
     let VolumeShape { nz, ny, nx, channels } = *shape;

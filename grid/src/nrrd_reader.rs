@@ -1,6 +1,6 @@
-//! NRRD files in: header lines, then samples that are raw, gzip or text, here or in a file of their own.
+//! Reader of NRRD files: header lines, then samples that are raw, gzip or text, in the same or a separate file.
 
-use crate::GridError;
+use crate::error::GridError;
 use crate::sample_type::SampleType;
 use flate2::read::MultiGzDecoder;
 use ndarray::{ArrayD, Axis, IxDyn};
@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-/// The samples, slowest axis first and the channel last.
+/// The samples, slowest axis first and the channel axis last.
 pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), GridError> {
     let bytes = fs::read(path).map_err(GridError::io(path))?;
     let wrong = |reason: String| GridError::NotVolume {
@@ -25,17 +25,17 @@ pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), Gri
     };
     let name = needed("type")?;
     let sample_type = SampleType::of_nrrd(name)
-        .ok_or_else(|| wrong(format!("holds samples of type `{name}`, which are no numbers")))?;
+        .ok_or_else(|| wrong(format!("holds samples of type `{name}`, which are not numbers")))?;
     let sizes: Vec<usize> = needed("sizes")?
         .split_whitespace()
         .map(|size| size.parse().ok())
         .collect::<Option<_>>()
-        .ok_or_else(|| wrong("its header has `sizes` that are no whole numbers".into()))?;
+        .ok_or_else(|| wrong("its header has `sizes` that are not integers".into()))?;
     let count = sizes
         .iter()
         .try_fold(1_usize, |count, &size| count.checked_mul(size))
         .filter(|count| count.checked_mul(8).is_some())
-        .ok_or_else(|| wrong(format!("says sizes {sizes:?}, more than can be counted")))?;
+        .ok_or_else(|| wrong(format!("states sizes {sizes:?}, more than can be counted")))?;
     let beside;
     let data = match header.get("data file").or_else(|| header.get("datafile")) {
         None => attached,
@@ -48,9 +48,9 @@ pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), Gri
     let skip = header.get("byte skip").map_or(Some(0), |skip| skip.parse().ok());
     let data = skip
         .and_then(|skip: usize| data.get(skip..))
-        .ok_or_else(|| wrong("its `byte skip` is not understood; save it without".into()))?;
+        .ok_or_else(|| wrong("its `byte skip` is not supported; save it without".into()))?;
     if header.get("line skip").is_some_and(|skip| skip != "0") {
-        return Err(wrong("its `line skip` is not understood; save it without".into()));
+        return Err(wrong("its `line skip` is not supported; save it without".into()));
     }
     let big_endian = header.get("endian").is_some_and(|endian| endian == "big");
     let expected = count * sample_type.size();
@@ -67,24 +67,25 @@ pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), Gri
             .split_whitespace()
             .map(|number| number.parse().ok())
             .collect::<Option<_>>()
-            .ok_or_else(|| wrong("its text holds what is no number".into()))?,
+            .ok_or_else(|| wrong("its text contains something that is not a number".into()))?,
         other => {
             return Err(wrong(format!("is encoded as `{other}`; save it raw or with gzip")));
         }
     };
     if samples.len() != count {
         return Err(wrong(format!(
-            "says {sizes:?} samples but holds {}; it is damaged or cut off",
+            "states {sizes:?} samples but holds {}; it is damaged or truncated",
             samples.len()
         )));
     }
     let slowest_first: Vec<usize> = sizes.iter().rev().copied().collect();
     let samples = ArrayD::from_shape_vec(IxDyn(&slowest_first), samples)
-        .map_err(|_| wrong(format!("says sizes {sizes:?}, which are no array")))?;
+        .map_err(|_| wrong(format!("states sizes {sizes:?}, which form no array")))?;
     Ok((channel_last(samples, header.get("kinds"), &sizes), sample_type))
 }
 
-/// The channel axis moved behind the others: the one whose kind is not a direction of space, or else the one of at most 4 samples among four.
+/// Moves the channel axis behind the others: the axis whose kind is not a direction of space, or else, among four axes,
+/// the one of at most 4 samples.
 fn channel_last(samples: ArrayD<f32>, kinds: Option<&String>, sizes: &[usize]) -> ArrayD<f32> {
     let is_space = |kind: &str| ["domain", "space", "time", "???"].contains(&kind);
     let named = kinds.and_then(|kinds| kinds.split_whitespace().position(|kind| !is_space(kind)));
@@ -94,7 +95,7 @@ fn channel_last(samples: ArrayD<f32>, kinds: Option<&String>, sizes: &[usize]) -
             .find(|&axis| sizes.len() == 4 && sizes[axis] <= 4)
     };
     let Some(axis) = named.or_else(small) else {
-        // A volume whose kinds say so, however few voxels it has along x.
+        // All kinds are directions of space, so three axes are a volume however few voxels it has along x.
         let is_volume = kinds.is_some() && sizes.len() == 3;
         return if is_volume {
             samples.insert_axis(Axis(3))
@@ -102,7 +103,7 @@ fn channel_last(samples: ArrayD<f32>, kinds: Option<&String>, sizes: &[usize]) -
             samples
         };
     };
-    // Axes of the file are fastest first, ours slowest first.
+    // The file lists the fastest axis first, the array the slowest.
     let Some(axis) = sizes.len().checked_sub(1 + axis) else {
         return samples;
     };
@@ -110,7 +111,7 @@ fn channel_last(samples: ArrayD<f32>, kinds: Option<&String>, sizes: &[usize]) -
     samples.permuted_axes(IxDyn(&order))
 }
 
-/// Fields of the header, and what stands behind it.
+/// Fields of the header, and the bytes after it.
 fn header(bytes: &[u8]) -> Result<(BTreeMap<String, String>, &[u8]), String> {
     if !bytes.starts_with(b"NRRD000") {
         return Err("is no NRRD file".into());
@@ -119,7 +120,7 @@ fn header(bytes: &[u8]) -> Result<(BTreeMap<String, String>, &[u8]), String> {
     let mut rest = bytes;
     loop {
         let Some(end) = rest.iter().position(|&byte| byte == b'\n') else {
-            // A header alone, whose samples are elsewhere.
+            // A header only; the samples are in another file.
             return Ok((fields, &[]));
         };
         let line = String::from_utf8_lossy(&rest[..end]);

@@ -1,27 +1,33 @@
-//! Volumes and pictures of any sample type, from files that any program wrote.
+//! Volumes and images of any sample type, from files that any program wrote.
 
+use crate::error::GridError;
 use crate::sample_type::SampleType;
-use crate::{GridError, npy, nrrd_reader, tiff_reader};
+use crate::{npy, nrrd_reader, tiff_reader};
 use ndarray::{Array4, ArrayD, Axis, Ix4};
 use std::path::Path;
 
-/// A volume as it stood in a file: samples in the file's own unit, axes (z, y, x, channel). A picture is a volume of one slice.
+/// A volume as stored in a file: samples in the file's own unit, axes (z, y, x, channel). An image is a volume of one
+/// slice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredVolume {
     /// The samples, as the nearest single-precision numbers.
     pub samples: Array4<f32>,
-    /// What they were in the file.
+    /// Their type in the file.
     pub sample_type: SampleType,
 }
 
-/// Reads a volume or a picture: `.npy`, `.nrrd` (raw, gzip or text; the samples may stand in a file of their own) or `.tif` (a page a z).
+/// Reads a volume or an image: `.npy`, `.nrrd` (raw, gzip or text; the samples may be in a separate file) or `.tif`
+/// (one page per z slice).
 ///
-/// Axes of a `.npy` are (y, x), (z, y, x) or (z, y, x, channel); (y, x, 3) and (y, x, 4) are colour pictures. NRRD's channel axis is found by its `kinds`, or else is the axis of at most 4
-/// samples among four. Samples may be of 8 to 64 bits, signed or not, or floating point, of either byte order. Memory: 4 bytes a sample, and the file's own bytes while it is read.
+/// The axes of a `.npy` are (y, x), (z, y, x) or (z, y, x, channel); (y, x, 3) and (y, x, 4) are colour images. NRRD's
+/// channel axis is given by its `kinds`; without them it is the axis of at most 4 samples among four. Samples may be
+/// integers of 8 to 64 bits, signed or unsigned, or floating point, in either byte order. Memory: 4 bytes per sample,
+/// and the file's own bytes while it is read.
 ///
 /// # Errors
 ///
-/// [`GridError::Io`]; [`GridError::UnknownFormat`] for another ending; [`GridError::NotVolume`] if the file is damaged, cut off, or holds what cannot be understood; the message says which.
+/// [`GridError::Io`]; [`GridError::UnreadableFormat`] for another extension; [`GridError::NotVolume`] if the file is
+/// damaged, truncated or has unsupported contents; the message states which.
 ///
 /// # Examples
 ///
@@ -53,7 +59,7 @@ pub fn read_volume(path: impl AsRef<Path>) -> Result<StoredVolume, GridError> {
     let samples = with_four_axes(samples).ok_or_else(|| GridError::NotVolume {
         path: path.to_owned(),
         reason: format!(
-            "has axes {shape:?}; a volume has (z, y, x) or (z, y, x, channel), a picture (y, x) or (y, x, 3)"
+            "has axes {shape:?}; a volume has (z, y, x) or (z, y, x, channel), an image (y, x) or (y, x, 3)"
         ),
     })?;
     if samples.is_empty() {
@@ -65,7 +71,7 @@ pub fn read_volume(path: impl AsRef<Path>) -> Result<StoredVolume, GridError> {
     Ok(StoredVolume { samples, sample_type })
 }
 
-/// (z, y, x, channel) from fewer axes.
+/// Axes (z, y, x, channel) from fewer.
 fn with_four_axes(samples: ArrayD<f32>) -> Option<Array4<f32>> {
     let channels = |samples: &ArrayD<f32>| matches!(samples.shape().last(), Some(3 | 4));
     let samples = match samples.ndim() {

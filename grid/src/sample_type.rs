@@ -1,6 +1,6 @@
-//! Sample types of volumes that other programs wrote, and their values.
+//! Sample types of files from other programs, and the conversion of their bytes to numbers.
 
-/// What a file's samples are.
+/// The sample type of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SampleType {
@@ -29,7 +29,7 @@ pub enum SampleType {
 }
 
 impl SampleType {
-    /// The value that means white, where the type itself says so: 1, 255, 65,535; `None` for ids, signed numbers and floating point.
+    /// The value of white if the type defines it: 1, 255, 65,535; `None` for ids, signed numbers and floating point.
     ///
     /// ```
     /// # use stereology_grid::SampleType;
@@ -46,7 +46,7 @@ impl SampleType {
         }
     }
 
-    /// The type by NumPy's descriptor, and whether its bytes are the most significant first.
+    /// The type of a NumPy descriptor, and whether it is big-endian.
     pub(crate) fn of_npy(descr: &str) -> Option<(Self, bool)> {
         let (order, kind) = descr.split_at_checked(1)?;
         let kind = match kind {
@@ -70,7 +70,7 @@ impl SampleType {
         }
     }
 
-    /// The type by one of NRRD's names for it.
+    /// The type of an NRRD type name.
     pub(crate) fn of_nrrd(name: &str) -> Option<Self> {
         Some(match name {
             "uchar" | "unsigned char" | "uint8" | "uint8_t" => Self::U8,
@@ -87,7 +87,7 @@ impl SampleType {
         })
     }
 
-    /// Bytes of a sample.
+    /// Bytes per sample.
     pub(crate) fn size(self) -> usize {
         match self {
             Self::Bool | Self::U8 | Self::I8 => 1,
@@ -97,8 +97,8 @@ impl SampleType {
         }
     }
 
-    /// The samples of bytes, as the nearest single-precision numbers; a rest shorter than a sample is left out.
-    #[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is what is asked for")]
+    /// The samples as the nearest single-precision numbers; a remainder shorter than a sample is ignored.
+    #[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is the result")]
     pub(crate) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f32> {
         macro_rules! each {
             ($type:ty, $n:literal) => {

@@ -1,6 +1,6 @@
-//! TIFF files in: every page is a slice.
+//! Reader of TIFF files: every page is a z slice.
 
-use crate::GridError;
+use crate::error::GridError;
 use crate::sample_type::SampleType;
 use ndarray::{ArrayD, IxDyn};
 use std::fs::File;
@@ -20,7 +20,7 @@ pub(crate) fn read_samples(path: &Path) -> Result<(ArrayD<f32>, SampleType), Gri
 
 fn pages(file: impl Read + Seek) -> Result<(ArrayD<f32>, SampleType), String> {
     let damaged = |error: tiff::TiffError| format!("cannot be read as TIFF: {error}");
-    // A damaged header must not ask for all memory there is.
+    // A damaged header must not allocate all the memory.
     let mut limits = Limits::default();
     limits.decoding_buffer_size = 1 << 32;
     let mut decoder = Decoder::new(file).map_err(damaged)?.with_limits(limits);
@@ -41,7 +41,7 @@ fn pages(file: impl Read + Seek) -> Result<(ArrayD<f32>, SampleType), String> {
         let (of_first, kind_of_first) = *first.get_or_insert((shape, kind));
         if (of_first, kind_of_first) != (shape, kind) || page.len() != height * width * channels {
             return Err(format!(
-                "page {} is {width} x {height} of {channels} channels ({kind:?}), unlike the first; save slices of one size and type",
+                "page {} is {width} x {height} of {channels} channels ({kind:?}), unlike the first page; save slices of one size and type",
                 slices + 1
             ));
         }
@@ -53,22 +53,22 @@ fn pages(file: impl Read + Seek) -> Result<(ArrayD<f32>, SampleType), String> {
         decoder.next_image().map_err(damaged)?;
     }
     let Some(([height, width, channels], kind)) = first else {
-        return Err("holds no page".into());
+        return Err("has no page".into());
     };
-    // An opacity beside grey is left out, as it is beside colours by whoever measures.
+    // An opacity channel is kept here; callers that measure ignore it.
     let samples = ArrayD::from_shape_vec(IxDyn(&[slices, height, width, channels]), samples)
         .map_err(|error| error.to_string())?;
     Ok((samples, kind))
 }
 
-/// Samples of a page as numbers.
-#[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is what is asked for")]
+/// Samples of a page as single-precision numbers.
+#[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is the result")]
 fn values(page: DecodingResult, bits: u8, width: usize) -> Result<(Vec<f32>, SampleType), String> {
     fn all<T: Copy>(samples: Vec<T>, value: impl Fn(T) -> f32) -> Vec<f32> {
         samples.into_iter().map(value).collect()
     }
     Ok(match page {
-        // One bit a pixel, rows filled up to whole bytes.
+        // One bit per pixel, rows padded to whole bytes.
         DecodingResult::U8(packed) if bits == 1 => {
             let row = width.div_ceil(8).max(1);
             let bit = |row: &[u8], x: usize| f32::from(row[x / 8] >> (7 - x % 8) & 1);

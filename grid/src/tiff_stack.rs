@@ -1,11 +1,13 @@
-//! TIFF, one page a z, laid out as ImageJ lays out a stack: the samples of all pages in one piece, then the directories.
+//! TIFF with one page per z slice, laid out as ImageJ's stacks: the samples of all pages in one block, then the
+//! directories.
 //!
-//! ImageJ ignores the directories behind the first of a file that calls itself its stack, and other readers follow it; so the samples must not be interrupted.
+//! In a file that declares itself an ImageJ stack, ImageJ and other readers use only the first directory and expect the
+//! samples of all pages without a gap.
 
-use crate::VolumeShape;
 use crate::element::Element;
+use crate::volume_shape::VolumeShape;
 
-/// What stands before and behind the samples. A standard TIFF, or a BigTIFF where 32-bit offsets do not suffice.
+/// The bytes before and after the samples: of a standard TIFF, or of a BigTIFF if 32-bit offsets do not suffice.
 pub(crate) fn frame<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> (Vec<u8>, Vec<u8>) {
     // A page's directory takes some 300 bytes.
     let big = bytes.saturating_add(1024 * shape.nz as u64) > u64::from(u32::MAX);
@@ -31,7 +33,7 @@ pub(crate) fn frame<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u
     (head, tail)
 }
 
-/// What ImageJ reads the number of slices and their distance from.
+/// The description from which ImageJ reads the number of slices and their spacing.
 fn description(slices: usize, spacing: f64) -> Vec<u8> {
     format!("ImageJ=1.54f\nimages={slices}\nslices={slices}\nspacing={spacing}\nloop=false\n\0").into_bytes()
 }
@@ -68,7 +70,7 @@ impl Kind {
         if self.big { 16 } else { 8 }
     }
 
-    /// A place in the file; those of a standard TIFF were seen to fit.
+    /// An offset in the file; those of a standard TIFF are known to fit in 32 bits.
     fn offset(self, at: u64) -> Vec<u8> {
         let mut bytes = at.to_le_bytes().to_vec();
         bytes.truncate(self.offset_length());
@@ -112,7 +114,7 @@ impl Directory {
         self.add(SAMPLE_FORMAT, SHORT, each(T::TIFF_SAMPLE));
     }
 
-    /// The directory's bytes at the even place `at`, with the values that do not fit into their entries behind it.
+    /// The bytes of the directory at the even offset `at`, followed by the values that do not fit into their entries.
     fn written(mut self, kind: Kind, at: u64, last: bool) -> Vec<u8> {
         self.entries.sort_by_key(|entry| entry.0);
         let room = kind.offset_length();
@@ -151,8 +153,8 @@ impl Directory {
     }
 }
 
-/// Pixels per unit of length as a fraction, to one part in a million where 32 bits allow.
-#[expect(clippy::cast_possible_truncation, reason = "clamped to the range of u32 before")]
+/// Pixels per unit of length as a fraction, to one part in a million if 32 bits allow it.
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the range of u32 above")]
 fn per_unit(spacing: f64) -> Vec<u8> {
     let largest = f64::from(u32::MAX);
     let (n, d) = if spacing >= 1.0 {

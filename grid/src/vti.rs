@@ -1,9 +1,9 @@
-//! VTK XML image data: the voxels as cell data, appended raw.
+//! VTK XML image data: the voxels as raw appended cell data.
 
-use crate::VolumeShape;
 use crate::element::Element;
+use crate::volume_shape::VolumeShape;
 
-/// Everything before the samples, their number of bytes (`UInt64`) included.
+/// Everything before the samples, including their number of bytes (`UInt64`).
 pub(crate) fn header<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> Vec<u8> {
     let VolumeShape { nz, ny, nx, channels } = *shape;
     let [sx, sy, sz] = spacing;

@@ -1,7 +1,9 @@
-//! OME-Zarr 0.5: a folder of one array a resolution, each halved from the one before, stored in shards of chunks.
+//! OME-Zarr 0.5: a folder with one array per resolution, each half as fine as the one before, stored in shards of
+//! chunks.
 //!
-//! A shard is 32 slabs thick, so it is written as soon as 32 slabs are there, as a file of its own that appears whole; a call that was broken off goes on behind the last 32 slabs whose shards are all there. The axes are
-//! (c, z, y, x), as OME-Zarr has channels before space. Sources: Zarr core specification 3, sharding codec 1.0, OME-Zarr 0.5.
+//! A shard is 32 slabs thick. It is written as a file of its own as soon as 32 slabs are computed, complete or not at
+//! all; an interrupted call resumes after the last 32 slabs whose shards are all complete. The axes are (c, z, y, x),
+//! as OME-Zarr places channels before space. Sources: Zarr core specification 3, sharding codec 1.0, OME-Zarr 0.5.
 
 mod levels;
 mod metadata;
@@ -9,22 +11,18 @@ mod shard;
 
 use crate::atomic::{partial_name, write_atomically};
 use crate::element::Element;
+use crate::error::GridError;
 use crate::slabs::Slabs;
-use crate::{GridError, VolumeShape};
+use crate::volume_shape::VolumeShape;
 use levels::Level;
 use ndarray::ArrayViewMut3;
+use shard::CHUNK;
 use std::fs;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Slabs in a shard, and voxels along each side of a chunk.
-const CHUNK: usize = 32;
-/// Chunks along y and x in a shard, at most.
-const CHUNKS: usize = 16;
-/// The coarsest resolution has at most so many voxels along its longest side.
-const COARSE: usize = 128;
-
+/// Writes all resolutions; with `resume` the complete shards of `NAME.partial` are kept.
 pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
     path: &Path,
     shape: &VolumeShape,
@@ -50,7 +48,7 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
         )?;
     }
     for z in (0..done).step_by(CHUNK) {
-        // Already written; the coarser resolutions need them again.
+        // Already written, but the coarser resolutions are computed from them again.
         for slab in levels[0].read_slabs(z)? {
             levels::push(&mut levels, &slab, false)?;
         }
@@ -59,7 +57,8 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
     folder.publish()
 }
 
-/// How many slabs of the finest resolution are there in whole shards, the same as ours as far as metadata, first and last slab tell.
+/// Number of slabs of the finest resolution in complete shards. The metadata and the first and last of these slabs must
+/// equal ours.
 fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
     partial: &Path,
     root: &str,
@@ -73,8 +72,8 @@ fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<
     if done == 0 {
         return Ok(0);
     }
-    let told = fs::read_to_string(partial.join("zarr.json")).map_err(GridError::io(partial))?;
-    if told != root {
+    let found = fs::read_to_string(partial.join("zarr.json")).map_err(GridError::io(partial))?;
+    if found != root {
         return Err(other());
     }
     for z in [0, done - 1] {
@@ -90,7 +89,7 @@ fn write_text(path: &Path, text: &str) -> Result<(), GridError> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// `NAME.partial` while it is being filled; removed when dropped before it was published, unless it is to be kept.
+/// `NAME.partial` while it is being filled; removed if dropped before it is published, unless it is to be kept.
 struct PartialFolder {
     path: PathBuf,
     partial: PathBuf,
@@ -102,7 +101,7 @@ impl PartialFolder {
         if path.is_file() || (path.is_dir() && !is_zarr(path)) {
             return Err(GridError::io(path)(io::Error::new(
                 io::ErrorKind::AlreadyExists,
-                "is there and no Zarr folder; choose another name",
+                "exists and is no Zarr folder; choose another name",
             )));
         }
         let partial = partial_name(path);
@@ -118,7 +117,7 @@ impl PartialFolder {
     }
 
     fn publish(mut self) -> Result<(), GridError> {
-        self.keep = true; // from here on there is nothing to throw away but what was there before
+        self.keep = true; // complete: nothing to remove if a rename below fails
         let failed = || GridError::io(&self.path);
         let mut old = self.path.as_os_str().to_owned();
         old.push(".old");
@@ -138,7 +137,7 @@ impl PartialFolder {
 impl Drop for PartialFolder {
     fn drop(&mut self) {
         if !self.keep {
-            // There is nobody to tell if the removal fails.
+            // A failed removal cannot be reported from here.
             let _ = fs::remove_dir_all(&self.partial);
         }
     }

@@ -1,9 +1,14 @@
 //! `cargo xtask`: checks of the workspace, and the way to its studies.
 
+mod features;
+mod licence;
+mod policy;
+mod readers;
 mod tidy;
 mod workspace;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
@@ -21,6 +26,16 @@ struct Program {
 enum Task {
     /// Checks the invariants of ARCHITECTURE.md that a program can check
     Tidy,
+    /// Compiles every crate with each of its features alone and with none
+    Features,
+    /// Checks licences, sources, bans and Rust versions of all dependencies against deny.toml
+    Dependencies,
+    /// Writes files of every format and reads them with h5py, zarr, tifffile, pynrrd, VTK, DAMASK and OVITO
+    Readers {
+        /// Python that has these packages; without it they are installed under target/, or the check is skipped
+        #[arg(long)]
+        python: Option<PathBuf>,
+    },
     /// Runs all that has to pass before a change lands
     Ci,
     /// Runs the released program on data outside the project and writes the results into the pages under docs/
@@ -46,6 +61,9 @@ struct Forwarded {
 fn main() -> Result<()> {
     match Program::parse().task {
         Task::Tidy => tidy::run(),
+        Task::Features => features::run(),
+        Task::Dependencies => policy::run(),
+        Task::Readers { python } => readers::run(python.as_deref()),
         Task::Ci => ci(),
         Task::Acceptance(forwarded) => study("acceptance", &forwarded),
         Task::Sand(forwarded) => study("sand", &forwarded),

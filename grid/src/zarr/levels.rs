@@ -2,20 +2,25 @@
 
 use crate::atomic::write_atomically;
 use crate::element::Element;
-use crate::zarr::shard::Shard;
-use crate::zarr::{CHUNK, CHUNKS, COARSE};
-use crate::{GridError, VolumeShape};
+use crate::error::GridError;
+use crate::volume_shape::VolumeShape;
+use crate::zarr::shard::{CHUNK, Shard};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Largest number of chunks along y and x in a shard.
+const CHUNKS: usize = 16;
+/// The coarsest resolution has at most this many voxels along its longest side.
+const COARSE: usize = 128;
 
 /// One resolution, and its slabs that are in no shard yet.
 #[derive(Debug)]
 pub(crate) struct Level<T> {
     pub(crate) folder: PathBuf,
     pub(crate) shape: VolumeShape,
-    /// Slabs from a multiple of [`CHUNK`] on.
+    /// Slabs since the last multiple of [`CHUNK`].
     band: Vec<T>,
-    /// Slabs that came.
+    /// Number of slabs received.
     z: usize,
 }
 
@@ -52,7 +57,7 @@ impl<T: Element> Level<T> {
         self.shape.ny * self.shape.nx * self.shape.channels
     }
 
-    /// The shards of a band: their place in units of shards, and their file.
+    /// The shards of a band of [`CHUNK`] slabs, and their files.
     fn shards_of(&self, band: usize) -> impl Iterator<Item = (Shard, PathBuf)> + '_ {
         let [sy, sx] = self.shards();
         let (rows, columns) = (self.shape.ny.div_ceil(sy * CHUNK), self.shape.nx.div_ceil(sx * CHUNK));
@@ -67,7 +72,7 @@ impl<T: Element> Level<T> {
         })
     }
 
-    /// Slabs from 0 on whose shards are all there.
+    /// Number of slabs from z = 0 on whose shards all exist.
     pub(crate) fn whole_slabs(&self) -> usize {
         let bands = self.shape.nz.div_ceil(CHUNK);
         let whole = (0..bands).take_while(|&band| self.shards_of(band).all(|(_, file)| file.is_file()));
@@ -96,7 +101,8 @@ impl<T: Element> Level<T> {
         Ok(())
     }
 
-    /// The last one or two slabs as a slab of the next resolution: means of colours and of distances; of ids and categories, which have no mean, the first.
+    /// The last one or two slabs as a slab of the next resolution: means of colours and of distances. Ids and
+    /// categories have no mean; the first is taken.
     fn halved(&self) -> Vec<T> {
         let VolumeShape { ny, nx, channels, .. } = self.shape;
         let length = self.slab_length();
@@ -105,14 +111,14 @@ impl<T: Element> Level<T> {
         let labels = channels == 1 && T::TIFF_SAMPLE == 1;
         let mut half = Vec::with_capacity(length.div_ceil(4));
         for y in (0..ny).step_by(2) {
-            // The slab that came first has the first rows.
+            // Rows of the earlier slab come first.
             let rows: Vec<&[T]> = last
                 .chunks_exact(length)
                 .flat_map(|slab| slab.chunks_exact(nx * channels).skip(y).take(2))
                 .collect();
             match rows.as_slice() {
                 rows if labels => half.extend(rows[0].iter().step_by(2)),
-                // Nearly everywhere.
+                // The usual case: all eight voxels exist.
                 &[a, b, c, d] if nx % 2 == 0 && channels == 3 => half.extend(means::<T, 3>([a, b, c, d])),
                 &[a, b, c, d] if nx % 2 == 0 && channels == 1 => half.extend(means::<T, 1>([a, b, c, d])),
                 rows => half.extend((0..nx.div_ceil(2) * channels).map(|sample| {
@@ -131,7 +137,7 @@ impl<T: Element> Level<T> {
     }
 }
 
-/// The means over two by two by two voxels of so many channels, from the four rows that they lie in.
+/// Means over 2 × 2 × 2 voxels of `CHANNELS` channels each, from the four rows that contain them.
 fn means<'a, T: Element, const CHANNELS: usize>(rows: [&'a [T]; 4]) -> impl Iterator<Item = T> + 'a {
     let [a, b, c, d] = rows.map(|row| row.as_chunks::<CHANNELS>().0.as_chunks::<2>().0);
     let pairs = a.iter().zip(b).zip(c).zip(d);
@@ -144,7 +150,7 @@ fn means<'a, T: Element, const CHANNELS: usize>(rows: [&'a [T]; 4]) -> impl Iter
     })
 }
 
-/// Takes the next slab of the finest of `levels`; shards that are full are written if `write`.
+/// Adds the next slab to the finest of `levels`; complete shards are written if `write`.
 pub(crate) fn push<T: Element>(levels: &mut [Level<T>], slab: &[T], write: bool) -> Result<(), GridError> {
     let Some((level, coarser)) = levels.split_first_mut() else {
         return Ok(());
@@ -153,7 +159,7 @@ pub(crate) fn push<T: Element>(levels: &mut [Level<T>], slab: &[T], write: bool)
     level.z += 1;
     let last = level.z == level.shape.nz;
     if !coarser.is_empty() && (level.z % 2 == 0 || last) {
-        // What is coarser is written again: it takes in slabs that were not there when it was broken off.
+        // Coarser shards are always written: they may include slabs that were missing at the interruption.
         push(coarser, &level.halved(), true)?;
     }
     if level.z % CHUNK == 0 || last {

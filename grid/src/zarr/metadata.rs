@@ -1,17 +1,17 @@
 //! The `zarr.json` of the folder and of each resolution.
 
-use crate::VolumeShape;
 use crate::element::Element;
-use crate::zarr::CHUNK;
+use crate::volume_shape::VolumeShape;
+use crate::zarr::shard::CHUNK;
 
-/// Of the folder: axes, resolutions with their spacing, and for colours how to show them.
+/// Metadata of the folder: axes, resolutions with their spacing, and for colours the display of the channels.
 pub(crate) fn group(levels: &[VolumeShape], finest: &VolumeShape, spacing: [f64; 3]) -> String {
     let counts = |shape: &VolumeShape| [shape.nz, shape.ny, shape.nx];
     let datasets: Vec<String> = levels
         .iter()
         .enumerate()
         .map(|(level, shape)| {
-            // A voxel of a coarser resolution has 2^level voxels along each side; its centre is that of theirs.
+            // A voxel of a coarser resolution covers 2^level fine voxels along each axis and has their common centre.
             let fine = [spacing[2], spacing[1], spacing[0]];
             let times = 2_f64.powi(i32::try_from(level).unwrap_or(i32::MAX));
             debug_assert!(counts(shape).iter().zip(counts(finest)).all(|(&n, of)| n == of.div_ceil(1 << level)));
@@ -40,7 +40,7 @@ pub(crate) fn group(levels: &[VolumeShape], finest: &VolumeShape, spacing: [f64;
     )
 }
 
-/// Of one resolution: an array (c, z, y, x) in shards of chunks, uncompressed.
+/// Metadata of one resolution: an uncompressed array (c, z, y, x) in shards of chunks.
 pub(crate) fn array<T: Element>(shape: &VolumeShape, chunks: &[usize; 2]) -> String {
     let VolumeShape { nz, ny, nx, channels } = *shape;
     let [sy, sx] = chunks.map(|n| n * CHUNK);

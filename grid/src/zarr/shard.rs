@@ -1,21 +1,23 @@
-//! A shard: chunks one behind the other, then an index of where each begins and how long it is, then the index's checksum.
+//! A shard: its chunks one after the other, an index with the offset and length of each, and the checksum of the index.
 
-use crate::VolumeShape;
 use crate::element::Element;
-use crate::zarr::CHUNK;
+use crate::volume_shape::VolumeShape;
 use std::io::{self, Write};
 use std::ops::Range;
+
+/// Slabs in a shard, and voxels along each side of a chunk.
+pub(crate) const CHUNK: usize = 32;
 
 /// Where a shard lies in its band of slabs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shard {
-    /// Chunks along y and x.
+    /// Number of chunks along y and x.
     pub(crate) chunks: [usize; 2],
-    /// Its first voxel along y and x.
+    /// First voxel along y and x.
     pub(crate) from: [usize; 2],
 }
 
-/// Offset and length of a chunk that is not there: it lies outside the array.
+/// Offset and length of an absent chunk, one that lies outside the array.
 const MISSING: u64 = u64::MAX;
 
 impl Shard {
@@ -46,7 +48,7 @@ impl Shard {
         out.write_all(&crc32c(&index).to_le_bytes())
     }
 
-    /// Puts the samples of the shard into the slabs of its band; `None` if it is no shard of this shape.
+    /// Copies the samples of the shard into the slabs of its band; `None` if the bytes are too few for this shape.
     pub(crate) fn unpack<T: Element>(&self, bytes: &[u8], shape: &VolumeShape, slabs: &mut [Vec<T>]) -> Option<()> {
         let VolumeShape { ny, nx, channels, .. } = *shape;
         let length = channels * CHUNK.pow(3) * size_of::<T>();
@@ -73,14 +75,14 @@ impl Shard {
     }
 }
 
-/// A row of one channel: its first voxel in the slab, and where it lies in the chunk.
+/// A row of one channel: its first voxel in the slab, and its range in the chunk.
 struct Row {
     voxel: usize,
     channel: usize,
     inside: Range<usize>,
 }
 
-/// The rows at one z of a chunk whose first voxel is (y, x), as far as they lie in the array.
+/// The rows at one z of the chunk whose first voxel is (y, x), clipped to the array.
 fn rows([y, x]: [usize; 2], z: usize, shape: &VolumeShape) -> impl Iterator<Item = Row> + use<> {
     let VolumeShape { ny, nx, channels, .. } = *shape;
     let length = CHUNK.min(nx - x);
@@ -97,12 +99,12 @@ fn rows([y, x]: [usize; 2], z: usize, shape: &VolumeShape) -> impl Iterator<Item
 }
 
 impl Row {
-    /// Copies it from a slab of so many channels.
+    /// Copies the row from a slab of `channels` channels.
     fn pick<T: Copy>(self, slab: &[T], channels: usize, chunk: &mut [T]) {
         let to = &mut chunk[self.inside];
         let from = &slab[self.voxel * channels..(self.voxel + to.len()) * channels];
         match from.as_chunks::<3>() {
-            // As most often; known numbers are quick.
+            // The usual case; a constant number of channels is faster.
             (voxels, []) if channels == 3 && self.channel < 3 => {
                 to.iter_mut().zip(voxels).for_each(|(to, rgb)| *to = rgb[self.channel]);
             }
@@ -126,7 +128,7 @@ fn crc32c(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::{Shard, crc32c};
-    use crate::VolumeShape;
+    use crate::volume_shape::VolumeShape;
     use proptest::prelude::*;
 
     /// The check value of the polynomial's definition, and RFC 3720's of 32 zeros.
@@ -140,7 +142,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(16))]
 
         #[test]
-        fn a_shard_gives_back_its_slabs(ny in 1_usize..70, nx in 1_usize..70, depth in 1_usize..4, channels in prop_oneof![Just(1_usize), Just(3)]) {
+        fn slabs_are_read_back_from_their_shard(ny in 1_usize..70, nx in 1_usize..70, depth in 1_usize..4, channels in prop_oneof![Just(1_usize), Just(3)]) {
             let shape = VolumeShape { nz: depth, ny, nx, channels };
             let slab = ny * nx * channels;
             let band: Vec<u32> = (0..u32::try_from(slab * depth).unwrap()).collect();

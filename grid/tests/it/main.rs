@@ -3,6 +3,7 @@
 
 mod damaged;
 mod formats;
+mod hdf5;
 #[cfg(feature = "read")]
 mod other_programs;
 mod resume;

@@ -52,7 +52,8 @@ fn a_cancelled_volume_leaves_nothing_and_spares_the_old_one() {
     }
 }
 
-/// A folder is as whole as a file: another Zarr folder gives way to it only when it is finished, and nothing else gives way.
+/// A folder is as whole as a file: another Zarr folder gives way to it only when it is finished, and nothing else gives
+/// way.
 #[test]
 fn a_folder_appears_whole_or_not_at_all() {
     let place = tempfile::tempdir().unwrap();

@@ -60,8 +60,8 @@ fn described(group: &BTreeSet<PathBuf>, imports: &FileImports) -> String {
 
 /// Imports between the files of the crate whose root module is `root`.
 ///
-/// A name counts as imported from the file that defines it, whichever re-exports it came through; a re-export that its own file
-/// does not use is no import.
+/// A name counts as imported from the file that defines it, whichever re-exports it came through; a re-export that its
+/// own file does not use is no import.
 ///
 /// # Errors
 ///

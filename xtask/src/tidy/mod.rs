@@ -1,4 +1,5 @@
-//! The invariants of ARCHITECTURE.md that a program can check. Each check is a plain function from text or lists to findings.
+//! The invariants of ARCHITECTURE.md that a program can check. Each check is a plain function from text or lists to
+//! findings.
 
 mod dependencies;
 mod files;

@@ -37,7 +37,8 @@ pub struct Module {
 /// All modules of a crate by their path from the crate's root; the root's own path is empty. Test modules are left out.
 pub type ModuleTree = BTreeMap<Names, Module>;
 
-/// Reads the modules that `root` (`src/lib.rs` or `src/main.rs`) declares. `read` returns the text of a file, if it exists.
+/// Reads the modules that `root` (`src/lib.rs` or `src/main.rs`) declares. `read` returns the text of a file, if it
+/// exists.
 ///
 /// # Errors
 ///

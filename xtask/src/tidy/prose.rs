@@ -75,7 +75,8 @@ fn lines_inside_strings(text: &str) -> BTreeSet<usize> {
     lines
 }
 
-/// Command-line options and commands in a library's messages and documentation: a library knows no program that uses it.
+/// Command-line options and commands in a library's messages and documentation: a library knows no program that uses
+/// it.
 pub fn names_no_options(path: &Path, text: &str) -> Vec<Finding> {
     let Ok(tokens) = without_tests(text) else {
         return Vec::new();

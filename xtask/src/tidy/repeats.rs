@@ -12,8 +12,8 @@ const LONGEST_RUN: usize = 7;
 /// A line of code: file, number, text.
 type Line<'a> = (&'a Path, usize, String);
 
-/// Runs of more than [`LONGEST_RUN`] equal lines in the sources of two crates. Imports, comments, tests and lines without a word
-/// do not count. The first run that a pair of files shares is reported.
+/// Runs of more than [`LONGEST_RUN`] equal lines in the sources of two crates. Imports, comments, tests and lines
+/// without a word do not count. The first run that a pair of files shares is reported.
 pub fn repeats(sources: &[(PathBuf, String)]) -> Vec<Finding> {
     let mut runs: BTreeMap<Vec<String>, (&Path, usize)> = BTreeMap::new();
     let mut found: BTreeMap<(&Path, &Path), (usize, usize)> = BTreeMap::new();

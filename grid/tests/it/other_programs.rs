@@ -123,7 +123,7 @@ fn nrrd_may_be_packed_big_endian_detached_and_have_its_channels_last() {
     fs::write(folder.path().join("v.raw"), &data).unwrap();
     assert_eq!(read_volume(&header).unwrap(), read);
     fs::write(folder.path().join("v.raw"), &data[1..]).unwrap();
-    assert!(read_volume(&header).unwrap_err().to_string().contains("cut off"));
+    assert!(read_volume(&header).unwrap_err().to_string().contains("truncated"));
 }
 
 #[test]

@@ -5,18 +5,15 @@
 mod answer;
 mod arguments;
 mod commands;
-mod density_table;
 mod failure;
 mod manual;
 mod numbers;
 mod outputs;
 mod particle_files;
 mod particle_surfaces;
-mod profile_table;
 mod progress;
 mod report;
 mod values;
-mod voxel_table;
 mod warnings;
 
 use std::io::{self, Write};

@@ -10,6 +10,7 @@ use clap::{Args, ValueEnum};
 use ndarray::{Array3, Array4, ArrayView3, Axis};
 use serde_json::{Value, json};
 use stereology::exemplar::SolidError;
+use stereology::files::voxel_table::ValueRange;
 use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
 use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels};
 use stereology::metrics::{Seams, seams};
@@ -153,7 +154,12 @@ impl Grow {
         let measured = match &self.measured {
             None => Vec::new(),
             Some(path) => {
-                let found = measurements::read(path, self.measured_in, &voxels, channels, image.is_bytes)?;
+                let range = if image.is_bytes {
+                    ValueRange::Bytes
+                } else {
+                    ValueRange::Any
+                };
+                let found = measurements::read(path, self.measured_in, &voxels, channels, range)?;
                 found.warnings.into_iter().for_each(|warning| {
                     answer.warn(warning);
                 });

@@ -9,19 +9,18 @@ use stereology::anneal::{
     self, Grain, PackError, PackOptions, SizeDensities, SizeInBin, box_for_fraction, count_to_fill,
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
 };
-use stereology::files::PackingFile;
+use stereology::files::packing::PackingFile;
+use stereology::files::{densities, profiles};
 use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::commands::pack_quality;
-use crate::density_table::read_densities;
 use crate::failure::{Explain, Failure, body};
 use crate::numbers::{percent, significant};
 use crate::outputs::{check_file, write_png, write_text};
 use crate::particle_files::ParticleFormat;
 use crate::particle_surfaces;
-use crate::profile_table::read_profiles;
 use crate::progress::{Step, go_on};
 use crate::values::{BoxSides, ShapeShare, count, positive, share, shares};
 
@@ -237,7 +236,7 @@ impl Pack {
         drop(step);
         go_on()?;
         for (path, format) in also {
-            format.write(path, packing.bodies(), &period, packing.particles())?;
+            format.write(path, &packing)?;
         }
         if let Some(path) = &self.surfaces {
             particle_surfaces::write(path, packing.bodies(), packing.particles())?;
@@ -327,7 +326,7 @@ impl Pack {
                 ));
             }
             let mut grains = Vec::new();
-            let rows = read_profiles(table).at(table)?;
+            let rows = profiles::read(table).or_fail()?;
             let drawn = mix(
                 &rows.iter().map(|row| row.size * scale).collect::<Vec<_>>(),
                 shares,
@@ -385,7 +384,7 @@ impl Pack {
         everywhere: &Everywhere,
     ) -> Result<Population, Failure> {
         let mut histograms = Vec::new();
-        for histogram in read_densities(table)? {
+        for histogram in densities::read(table).or_fail()? {
             match histogram.shape {
                 Some(shape) if shape >= bodies.len() => return Err(no_such_shape(table, shape, bodies.len())),
                 Some(shape) => histograms.push((shape, histogram)),

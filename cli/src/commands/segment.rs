@@ -1,17 +1,17 @@
 //! `stereology segment`: a photograph -> profiles.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use stereology::files::profiles;
 use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, read_photo_up_to, write_labels};
 
 use crate::answer::Answer;
 use crate::arguments::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::numbers::{percent, significant};
-use crate::outputs::{OutputFolder, check_file, write_json, write_text};
+use crate::outputs::{OutputFolder, check_file, write_json};
 use crate::progress::{Step, go_on};
 use crate::values::{BinderArgument, CategoriesArgument, pair, positive};
 use crate::warnings::Warning;
@@ -248,23 +248,7 @@ pub fn figures(found: &Segmentation, scale: f64) -> Vec<(&'static str, Value)> {
 pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64) -> Result<(), Failure> {
     let labels = folder.file("labels.tif");
     write_labels(&labels, found.labels.view()).at(&labels)?;
-    let mut table = String::from("id,x,y,area,size,r,g,b,category,touches_edge,weight\n");
-    for p in &found.profiles {
-        let [r, g, b] = p.colour.map(|c| 255.0 * c);
-        let _ = writeln!(
-            table,
-            "{},{},{},{},{},{r},{g},{b},{},{},{}",
-            p.id,
-            p.x * scale,
-            p.y * scale,
-            p.area * scale * scale,
-            p.size * scale,
-            p.category,
-            u8::from(p.touches_edge),
-            p.weight
-        );
-    }
-    write_text(&folder.file("profiles.csv"), &table)?;
+    profiles::write(folder.file("profiles.csv"), found, scale).or_fail()?;
     for (name, picture) in [
         ("overlay.png", found.overlay()),
         ("binder.png", found.binder_picture()),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
-use stereology::files::{self, SavedSolid};
+use stereology::files::solid::{self, SavedSolid};
 use stereology::volume::{self, SlicePlane};
 
 use crate::answer::Answer;
@@ -103,5 +103,5 @@ pub fn open_solid(folder: &Path) -> Result<SavedSolid, Failure> {
             folder.display()
         )));
     }
-    files::open_solid(folder).at(folder)
+    solid::read(folder).at(folder)
 }

@@ -326,8 +326,8 @@ impl Synthesize {
     ) -> Result<(), Failure> {
         let (solid, pixel) = (&synthesis.solid, everywhere.scale);
         segment::write_files(folder, &synthesis.segmentation, pixel)?;
-        files::write_densities(folder.file("densities.csv"), &synthesis.densities).or_fail()?;
-        files::save_solid(folder.file(""), solid, &synthesis.details.residual, types).or_fail()?;
+        files::densities::write(folder.file("densities.csv"), &synthesis.densities).or_fail()?;
+        files::solid::write(folder.file(""), solid, &synthesis.details.residual, types).or_fail()?;
         solid
             .write_voxels(
                 folder.file("volume.npy"),

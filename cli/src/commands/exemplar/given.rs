@@ -4,34 +4,33 @@ use std::path::Path;
 
 use ndarray::Array3;
 use stereology::exemplar::FixedVoxel;
+use stereology::files::voxel_table::{self, ValueRange, ValueRow};
 use stereology::grid::read_volume;
 use stereology::grow::Voxels;
 
 use crate::answer::Answer;
 use crate::commands::grow::closed_mesh;
 use crate::failure::{Explain, Failure};
-use crate::voxel_table::{self, Row};
 use crate::warnings::Warning;
+
+/// Largest side of a solid, in voxels.
+const MOST: usize = 65_536;
 
 /// Voxels from rows of x, y, z and `channels` values of 0 to 255, which are divided by `scale`.
 pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel>, Failure> {
-    let voxel = |row: Row| {
-        let [x, y, z] = row.place;
-        if row
-            .place
-            .iter()
-            .any(|v| v.fract() != 0.0 || !(0.0..65_536.0).contains(v))
-        {
+    let voxel = |row: ValueRow| {
+        let Some([z, y, x]) = row.voxel([MOST; 3]) else {
+            let [x, y, z] = row.place;
             return Err(Failure::run(format!(
-                "{}, line {}: ({x}, {y}, {z}) is no voxel; x, y, z are whole numbers from 0",
+                "{}: line {}: ({x}, {y}, {z}) is not a voxel; x, y, z are whole numbers from 0",
                 path.display(),
                 row.line
             )));
-        }
-        let values = row.values.into_iter().map(|v| v / scale).collect();
-        Ok(([z as usize, y as usize, x as usize], values))
+        };
+        Ok(([z, y, x], row.values.iter().map(|v| v / scale).collect()))
     };
-    voxel_table::read(path, channels, true)?
+    voxel_table::read(path, channels, ValueRange::Bytes)
+        .or_fail()?
         .into_iter()
         .map(voxel)
         .collect()

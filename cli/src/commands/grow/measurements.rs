@@ -4,10 +4,10 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use nalgebra::Point3;
+use stereology::files::voxel_table::{self, ValueRange, ValueRow};
 use stereology::grow::Voxels;
 
-use crate::failure::Failure;
-use crate::voxel_table::{self, Row};
+use crate::failure::{Explain, Failure};
 use crate::warnings::Warning;
 
 /// What x, y, z are.
@@ -30,9 +30,15 @@ pub struct Measurements {
 /// Farthest a point of the surface may be from the centre of a voxel inside, voxels: a diagonal.
 const REACH: f64 = 1.75;
 
-/// Reads rows of x, y, z and a value for each of `channels`; `bytes` asks for whole numbers from 0 to 255.
-pub fn read(path: &Path, unit: Unit, voxels: &Voxels, channels: usize, bytes: bool) -> Result<Measurements, Failure> {
-    let rows = voxel_table::read(path, channels, bytes)?;
+/// Reads rows of x, y, z and a value in `range` for each of `channels`.
+pub fn read(
+    path: &Path,
+    unit: Unit,
+    voxels: &Voxels,
+    channels: usize,
+    range: ValueRange,
+) -> Result<Measurements, Failure> {
+    let rows = voxel_table::read(path, channels, range).or_fail()?;
     let in_mesh = || in_mesh(path, &rows, voxels);
     let found = match unit {
         Unit::Mesh => in_mesh()?,
@@ -52,7 +58,7 @@ pub fn read(path: &Path, unit: Unit, voxels: &Voxels, channels: usize, bytes: bo
     Ok(found)
 }
 
-fn in_mesh(path: &Path, rows: &[Row], voxels: &Voxels) -> Result<Measurements, Failure> {
+fn in_mesh(path: &Path, rows: &[ValueRow], voxels: &Voxels) -> Result<Measurements, Failure> {
     let (mut found, mut moved) = (Vec::new(), 0);
     for row in rows {
         let point = Point3::from(row.place);
@@ -85,13 +91,11 @@ fn in_mesh(path: &Path, rows: &[Row], voxels: &Voxels) -> Result<Measurements, F
     })
 }
 
-fn in_voxels(path: &Path, rows: &[Row], voxels: &Voxels) -> Result<Measurements, Failure> {
+fn in_voxels(path: &Path, rows: &[ValueRow], voxels: &Voxels) -> Result<Measurements, Failure> {
     let (nz, ny, nx) = voxels.inside.dim();
-    let index = |at: f64, n: usize| (at.fract() == 0.0 && at >= 0.0 && at < n as f64).then_some(at as usize);
-    let voxel = |row: &Row| {
-        let [x, y, z] = row.place;
-        let at = [index(z, nz)?, index(y, ny)?, index(x, nx)?];
-        voxels.inside[at].then_some((at, row.values.clone()))
+    let voxel = |row: &ValueRow| {
+        let at = row.voxel([nz, ny, nx])?;
+        voxels.inside[at].then(|| (at, row.values.clone()))
     };
     let found = rows.iter().map(|row| {
         voxel(row).ok_or_else(|| {

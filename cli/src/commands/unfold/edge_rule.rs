@@ -1,10 +1,10 @@
 //! `--edge-rule`: how much a profile counts at the edge of its slice, from what the table tells of it.
 
 use clap::ValueEnum;
+use stereology::files::profiles::ProfileRow;
 use stereology::unfold::{self, BoundingBox, SamplingWindow};
 
 use crate::failure::Failure;
-use crate::profile_table::TableProfile;
 
 /// Rules for profiles at the edges of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -33,7 +33,7 @@ impl EdgeRule {
     }
 
     /// Weighs the profiles of slices of this size, width and height; the weights of the table are replaced.
-    pub fn weigh(self, profiles: &mut [TableProfile], window: Option<[f64; 2]>) -> Result<(), Failure> {
+    pub fn weigh(self, profiles: &mut [ProfileRow], window: Option<[f64; 2]>) -> Result<(), Failure> {
         let name = self.rule().name();
         let boxes: Option<Vec<BoundingBox>> = profiles.iter().map(|profile| profile.bounding_box).collect();
         let weights = match (boxes, window, self) {

@@ -8,7 +8,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::{Value, json};
-use stereology::files::DensityRows;
+use stereology::files::densities::DensityRows;
+use stereology::files::profiles::{self, ProfileRow};
 use stereology::pipeline::{
     DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, SeparateCategories, TypeFractions,
     unfold_profiles,
@@ -20,7 +21,6 @@ use crate::arguments::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::numbers::{percent, significant};
 use crate::outputs::check_file;
-use crate::profile_table::{TableProfile, read_profiles};
 use crate::progress::{Step, go_on};
 use crate::values::{Window, count, positive};
 
@@ -83,7 +83,7 @@ pub struct Unfold {
 }
 
 /// A column of the table; empty if it is missing.
-fn column(profiles: &[TableProfile], of: impl Fn(&TableProfile) -> Option<usize>) -> Vec<usize> {
+fn column(profiles: &[ProfileRow], of: impl Fn(&ProfileRow) -> Option<usize>) -> Vec<usize> {
     let values: Option<Vec<usize>> = profiles.iter().map(of).collect();
     values.unwrap_or_default()
 }
@@ -124,7 +124,7 @@ impl Unfold {
 
     /// The table, in the unit of the run.
     fn measured(&self, scale: f64) -> Result<MeasuredProfiles, Failure> {
-        let mut profiles = read_profiles(&self.profiles).at(&self.profiles)?;
+        let mut profiles = profiles::read(&self.profiles).at(&self.profiles)?;
         if let Some(rule) = self.edge_rule {
             // Boxes and window in the unit of the table: weights have none.
             rule.weigh(&mut profiles, self.window.map(|Window(sides)| sides))?;

@@ -1,0 +1,290 @@
+//! `densities.csv`: particles per unit volume by size bin. Columns `lower_edge,upper_edge,number_density,lower,upper,type,category`; `type` and `category` are
+//! empty for sums over them.
+
+use crate::files::FileError;
+use crate::pipeline::ParticleDensities;
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+use stereology_grid::write_atomically;
+use stereology_unfold::Unfolding;
+
+/// Writes the densities of a solid: rows of all particles, then those of each category if there are several.
+///
+/// # Errors
+///
+/// [`FileError`] if it cannot be written.
+///
+/// # Examples
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use stereology::files::densities;
+/// use stereology::pipeline::{DensityOptions, MeasuredProfiles, ParticleTypes, unfold_profiles};
+///
+/// let profiles = MeasuredProfiles { sizes: vec![3.0, 4.0, 5.0], weights: vec![1.0; 3], categories: vec![0; 3], area: 100.0, ..MeasuredProfiles::default() };
+/// let options = DensityOptions { bins: 2, ..DensityOptions::default() };
+/// let found = unfold_profiles(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
+/// let folder = tempfile::tempdir()?;
+/// densities::write(folder.path().join("densities.csv"), &found)?;
+/// let table = std::fs::read_to_string(folder.path().join("densities.csv"))?;
+/// assert_eq!(table.lines().count(), 1 + 2);
+/// assert!(table.lines().nth(2).is_some_and(|row| row.starts_with("2.5,5,")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write(path: impl AsRef<Path>, densities: &ParticleDensities) -> Result<(), FileError> {
+    let mut rows = DensityRows::default();
+    rows.unfolding(&densities.all, None, None);
+    if densities.by_category.len() > 1 {
+        for (category, number_density) in densities.by_category.iter().enumerate() {
+            rows.densities(&densities.all.edges, number_density, None, Some(category));
+        }
+    }
+    rows.write(path)
+}
+
+/// Rows of a density table, to be written together.
+///
+/// # Examples
+///
+/// ```
+/// use stereology::files::densities::DensityRows;
+///
+/// let mut rows = DensityRows::default();
+/// rows.densities(&[0.0, 1.0, 2.0], &[None, Some(0.25)], Some(0), None); // no density in the first bin
+/// let folder = tempfile::tempdir()?;
+/// rows.write(folder.path().join("densities.csv"))?;
+/// assert!(std::fs::read_to_string(folder.path().join("densities.csv"))?.ends_with("0,1,,,,0,\n1,2,0.25,,,0,\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct DensityRows {
+    lines: Vec<String>,
+}
+
+impl DensityRows {
+    /// Adds the bins of an unfolding with their intervals; `None` for a type or category means all together, an empty field.
+    pub fn unfolding(&mut self, unfolding: &Unfolding, particle_type: Option<usize>, category: Option<usize>) {
+        let intervals = unfolding
+            .intervals
+            .clone()
+            .unwrap_or_else(|| vec![None; unfolding.number_density.len()]);
+        for (bin, interval) in intervals.iter().enumerate() {
+            let ends = interval.map(|interval| [interval.lower, interval.upper]);
+            self.row(
+                &unfolding.edges[bin..bin + 2],
+                unfolding.number_density[bin],
+                ends,
+                particle_type,
+                category,
+            );
+        }
+    }
+
+    /// Adds bins without intervals.
+    pub fn densities(
+        &mut self,
+        edges: &[f64],
+        number_density: &[Option<f64>],
+        particle_type: Option<usize>,
+        category: Option<usize>,
+    ) {
+        for (edges, density) in edges.windows(2).zip(number_density) {
+            self.row(edges, *density, None, particle_type, category);
+        }
+    }
+
+    fn row(
+        &mut self,
+        edges: &[f64],
+        density: Option<f64>,
+        ends: Option<[f64; 2]>,
+        particle_type: Option<usize>,
+        category: Option<usize>,
+    ) {
+        let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+        let index = |value: Option<usize>| value.map(|v| v.to_string()).unwrap_or_default();
+        self.lines.push(format!(
+            "{},{},{},{},{},{},{}",
+            edges[0],
+            edges[1],
+            number(density),
+            number(ends.map(|e| e[0])),
+            number(ends.map(|e| e[1])),
+            index(particle_type),
+            index(category)
+        ));
+    }
+
+    /// Writes the table, completely or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError`] if it cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
+        Ok(write_atomically(path, |out| {
+            writeln!(out, "lower_edge,upper_edge,number_density,lower,upper,type,category")?;
+            self.lines.iter().try_for_each(|line| writeln!(out, "{line}"))
+        })?)
+    }
+}
+
+/// Number densities of one particle type and colour category in contiguous size bins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DensityHistogram {
+    /// Index of the shape; `None` if the table has no types.
+    pub shape: Option<usize>,
+    /// Colour category.
+    pub category: u8,
+    /// Edges of the size bins.
+    pub edges: Vec<f64>,
+    /// Particles per unit volume; bins without a density are empty.
+    pub number_density: Vec<f64>,
+}
+
+type Key = (Option<usize>, Option<u8>);
+
+/// Reads a table with the columns `lower_edge,upper_edge,number_density` and, optionally, `type` and `category`.
+///
+/// Rows without a category are sums over the categories and are left out if other rows have a category; likewise for types.
+///
+/// # Errors
+///
+/// [`FileError`] with the line: a missing column, a value that is not a number, bins that do not follow each other, no density above zero.
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<DensityHistogram>, FileError> {
+    let path = path.as_ref();
+    parse(path).map_err(|what| FileError::value(path, what))
+}
+
+fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|error| format!("cannot be read ({error})"))?;
+    let headers = reader.headers().map_err(|error| error.to_string())?.clone();
+    let column = |name: &str| headers.iter().position(|header| header == name);
+    let needed = |name: &str| {
+        column(name).ok_or_else(|| {
+            format!("line 1 has no column `{name}`; a table of densities has the columns lower_edge,upper_edge,number_density,...")
+        })
+    };
+    let (lower, upper, density) = (needed("lower_edge")?, needed("upper_edge")?, needed("number_density")?);
+    let (shape, category) = (column("type"), column("category"));
+    let mut histograms: BTreeMap<Key, Vec<[f64; 3]>> = BTreeMap::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| error.to_string())?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: usize| match record.get(column).unwrap_or_default().parse::<f64>() {
+            Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+            _ => Err(format!(
+                "line {line}: `{}` in column `{}` is not a finite number, zero or above",
+                record.get(column).unwrap_or_default(),
+                &headers[column]
+            )),
+        };
+        let index = |column: Option<usize>| match column.and_then(|column| record.get(column)).unwrap_or_default() {
+            "" => Ok(None),
+            text => text
+                .parse::<u8>()
+                .map(Some)
+                .map_err(|_| format!("line {line}: `{text}` is not an index from 0 to 255")),
+        };
+        let (a, b) = (number(lower)?, number(upper)?);
+        if a >= b {
+            return Err(format!("line {line}: the bin from {a} to {b} is empty"));
+        }
+        let n = if record.get(density).unwrap_or_default().is_empty() {
+            0.0
+        } else {
+            number(density)?
+        };
+        let bins = histograms
+            .entry((index(shape)?.map(usize::from), index(category)?))
+            .or_default();
+        if bins.last().is_some_and(|last| (last[1] - a).abs() > 1e-9 * b) {
+            return Err(format!(
+                "line {line}: the bin begins at {a}, but the one before ends elsewhere; bins follow each other"
+            ));
+        }
+        bins.push([a, b, n]);
+    }
+    let with_category = histograms.keys().any(|key| key.1.is_some());
+    let with_shape = histograms
+        .keys()
+        .any(|key| key.0.is_some() && key.1.is_some() == with_category);
+    let found: Vec<DensityHistogram> = histograms
+        .into_iter()
+        .filter(|((shape, category), _)| category.is_some() == with_category && shape.is_some() == with_shape)
+        .map(|((shape, category), bins)| DensityHistogram {
+            shape,
+            category: category.unwrap_or(0),
+            edges: bins
+                .iter()
+                .take(1)
+                .map(|bin| bin[0])
+                .chain(bins.iter().map(|bin| bin[1]))
+                .collect(),
+            number_density: bins.iter().map(|bin| bin[2]).collect(),
+        })
+        .collect();
+    if found
+        .iter()
+        .flat_map(|histogram| &histogram.number_density)
+        .all(|&n| n <= 0.0)
+    {
+        return Err("no number density is above zero; there is nothing to pack".to_owned());
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::read;
+
+    fn table(text: &str) -> Result<Vec<super::DensityHistogram>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("densities.csv");
+        std::fs::write(&file, text).unwrap();
+        read(&file).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn sums_are_left_out_where_parts_are_given() {
+        let found = table(
+            "lower_edge,upper_edge,number_density,lower,upper,type,category\n0,1,,,,,\n1,2,3,,,,\n0,1,,,,,0\n1,2,1,,,,0\n0,1,,,,,1\n1,2,2,,,,1\n",
+        )
+        .unwrap();
+        assert_eq!(found.len(), 2);
+        assert_eq!(
+            (
+                found[1].category,
+                found[1].edges.as_slice(),
+                found[1].number_density.as_slice()
+            ),
+            (1, &[0.0, 1.0, 2.0][..], &[0.0, 2.0][..])
+        );
+        assert_eq!(
+            table("lower_edge,upper_edge,number_density\n0,1,5\n").unwrap()[0].shape,
+            None
+        );
+    }
+
+    #[test]
+    fn a_wrong_table_says_where() {
+        for (text, what) in [
+            ("", "lower_edge"),
+            ("lower_edge,upper_edge\n0,1\n", "number_density"),
+            ("lower_edge,upper_edge,number_density\n0,1,x\n", "line 2: `x`"),
+            ("lower_edge,upper_edge,number_density\n0,1,-2\n", "zero or above"),
+            ("lower_edge,upper_edge,number_density\n1,1,2\n", "is empty"),
+            (
+                "lower_edge,upper_edge,number_density\n0,1,2\n3,4,2\n",
+                "follow each other",
+            ),
+            ("lower_edge,upper_edge,number_density\n0,1,\n", "nothing to pack"),
+        ] {
+            let error = table(text).unwrap_err();
+            assert!(error.contains(what), "{text:?}: {error}");
+        }
+    }
+}

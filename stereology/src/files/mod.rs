@@ -1,0 +1,31 @@
+//! Files of profiles, densities, packings and solids: one module per format, with its `write` and its `read`.
+//!
+//! Lengths are in the unit of the run, colours are sRGB-encoded values / 255. Files hold neither times nor paths. Every file is written completely or not at
+//! all, and numbers are read back bit for bit.
+//!
+//! | module | file | content |
+//! |---|---|---|
+//! | [`profiles`] | `profiles.csv` | a table of profiles |
+//! | [`densities`] | `densities.csv` | particles per volume by size bin, type and category |
+//! | [`packing`] | `packing.json` | particles in a periodic box |
+//! | [`solid`] | a folder | a packing with its colours and its residual |
+//! | [`residual`] | `texture.npy` | the residual volume of a solid |
+//! | [`particle_table`] | CSV | particles, one per row |
+//! | [`xyz`] | extended XYZ | particles and box, for OVITO |
+//! | [`vtp`] | VTK poly data | particles as points, for ParaView |
+//! | [`voxel_table`] | CSV | values at single voxels or points |
+
+mod error;
+mod json;
+
+pub mod densities;
+pub mod packing;
+pub mod particle_table;
+pub mod profiles;
+pub mod residual;
+pub mod solid;
+pub mod voxel_table;
+pub mod vtp;
+pub mod xyz;
+
+pub use error::FileError;

@@ -221,7 +221,7 @@ impl Examined {
         }
     }
 
-    /// Neither the count nor the least gap depends on the order of the parts; the pairs are sorted afterwards.
+    /// The results of both.
     fn joined(mut self, other: Self) -> Self {
         self.pairs.extend(other.pairs);
         self.certificate.pairs += other.certificate.pairs;
@@ -251,28 +251,31 @@ fn examine(arrangement: &Arrangement) -> Examined {
         size: particles[i].size,
         rotation: &turns[i],
     };
-    let mut found = (0..particles.len())
+    let blocks: Vec<Examined> = (0..particles.len().div_ceil(BLOCK))
         .into_par_iter()
-        .with_min_len(64)
-        .fold(Examined::nothing, |mut found, first| {
-            for neighbour in neighbours.of(first).1 {
-                let second = neighbour.other as usize;
-                let offset = centres[second] + neighbours.images.shift(neighbour.image) - centres[first];
-                found.certificate.pairs += 1;
-                match separation(&placed(first), &placed(second), &offset) {
-                    Separation::Apart { gap } => {
-                        found.certificate.least_gap = found.certificate.least_gap.min(gap);
+        .map(|block| {
+            let mut found = Examined::nothing();
+            for first in block * BLOCK..particles.len().min((block + 1) * BLOCK) {
+                for neighbour in neighbours.of(first).1 {
+                    let second = neighbour.other as usize;
+                    let offset = centres[second] + neighbours.images.shift(neighbour.image) - centres[first];
+                    found.certificate.pairs += 1;
+                    match separation(&placed(first), &placed(second), &offset) {
+                        Separation::Apart { gap } => {
+                            found.certificate.least_gap = found.certificate.least_gap.min(gap);
+                        }
+                        Separation::Overlap { depth } => found.pairs.push(Overlap {
+                            first: first.min(second),
+                            second: first.max(second),
+                            depth,
+                        }),
                     }
-                    Separation::Overlap { depth } => found.pairs.push(Overlap {
-                        first: first.min(second),
-                        second: first.max(second),
-                        depth,
-                    }),
                 }
             }
             found
         })
-        .reduce(Examined::nothing, Examined::joined);
+        .collect();
+    let mut found = blocks.into_iter().fold(Examined::nothing(), Examined::joined);
     found.pairs.sort_by(|p, q| {
         q.depth
             .total_cmp(&p.depth)
@@ -282,6 +285,8 @@ fn examine(arrangement: &Arrangement) -> Examined {
     found
 }
 
+/// Particles per task; fixed, so that the result does not depend on the number of threads.
+const BLOCK: usize = 64;
 /// Relative tolerance for the rounding of coordinates and support points.
 const ROUNDING: f64 = 1e-12;
 

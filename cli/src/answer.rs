@@ -1,48 +1,38 @@
-//! What a command answers: one JSON object for programs, or a few lines for people.
+//! The answer of a command: one JSON object for programs, or a few lines for people.
 
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::arguments::Everywhere;
+use crate::everywhere::Everywhere;
+use crate::failure::{Explain, Failure};
 use crate::warnings::{self, Warning};
 
-/// The answer of one command.
-#[derive(Debug)]
-pub struct Answer {
-    command: &'static str,
-    fields: Map<String, Value>,
+/// The fields that a command adds to its JSON object, in the order of the struct.
+pub trait Fields: Serialize + JsonSchema {
+    /// Name of the command.
+    const COMMAND: &'static str;
+}
+
+/// What a command reports besides its fields.
+#[derive(Debug, Default)]
+pub struct Notes {
     text: Vec<String>,
     warnings: Vec<Warning>,
     seconds: Option<Value>,
 }
 
-impl Answer {
-    /// An empty answer of `command`.
-    pub fn new(command: &'static str) -> Self {
-        Self {
-            command,
-            fields: Map::new(),
-            text: Vec::new(),
-            warnings: Vec::new(),
-            seconds: None,
-        }
-    }
-
-    /// Adds a field of the JSON object; numbers that are not finite become `null`.
-    pub fn field(&mut self, name: &str, value: impl Into<Value>) -> &mut Self {
-        self.fields.insert(name.to_owned(), value.into());
-        self
-    }
-
+impl Notes {
     /// Adds a line of the summary for people.
     pub fn line(&mut self, line: impl Into<String>) -> &mut Self {
         self.text.push(line.into());
         self
     }
 
-    /// Adds a warning; the same one is told once.
+    /// Adds a warning, unless the same one is there already.
     pub fn warn(&mut self, warning: Warning) -> &mut Self {
         if !self.warnings.contains(&warning) {
             self.warnings.push(warning);
@@ -50,50 +40,87 @@ impl Answer {
         self
     }
 
-    /// Elapsed time, of the whole or by step: shown on stdout, never written into a file.
+    /// Elapsed time in seconds, of the whole command or by step: printed, but never written into a file.
     pub fn seconds(&mut self, seconds: impl Into<Value>) -> &mut Self {
         self.seconds = Some(seconds.into());
         self
     }
+}
 
-    /// The object that goes into a `summary.json`: the same bytes whenever and wherever it is made, so without `seconds`.
+/// The answer of one command.
+#[derive(Debug)]
+pub struct Answer {
+    command: &'static str,
+    fields: Map<String, Value>,
+    /// Lines, warnings and times.
+    pub notes: Notes,
+}
+
+impl Answer {
+    /// The answer with these fields; numbers that are not finite become `null`.
+    pub fn new<T: Fields>(fields: &T, notes: Notes) -> Result<Self, Failure> {
+        match serde_json::to_value(fields).or_fail()? {
+            Value::Object(fields) => Ok(Self {
+                command: T::COMMAND,
+                fields,
+                notes,
+            }),
+            _ => Err(Failure::run(format!(
+                "the answer of `{}` is not an object; please report this fault",
+                T::COMMAND
+            ))),
+        }
+    }
+
+    /// The object for a `summary.json`. It has no `seconds`, so that equal inputs give equal bytes.
     pub fn summary(&self) -> Value {
         let mut object = Map::new();
-        object.insert("schema".to_owned(), json!(format!("stereology.{}/1", self.command)));
+        object.insert("schema".to_owned(), json!(schema_name(self.command)));
         object.insert(
             "warnings".to_owned(),
-            self.warnings.iter().map(warnings::to_json).collect(),
+            json!(
+                self.notes
+                    .warnings
+                    .iter()
+                    .map(warnings::Record::from)
+                    .collect::<Vec<_>>()
+            ),
         );
         object.extend(self.fields.clone());
         Value::Object(object)
     }
 
-    /// Prints the answer; exit code 0, or 3 with warnings under `--strict`.
+    /// Prints the answer; the exit code is 0, or 3 if there are warnings and `--strict` is given.
     pub fn print(&self, everywhere: &Everywhere) -> ExitCode {
+        let Notes {
+            text,
+            warnings,
+            seconds,
+        } = &self.notes;
         let mut out = String::new();
         if everywhere.json {
             let mut object = self.summary();
-            if let (Some(seconds), Value::Object(fields)) = (&self.seconds, &mut object) {
+            if let (Some(seconds), Value::Object(fields)) = (seconds, &mut object) {
                 fields.insert("seconds".to_owned(), seconds.clone());
             }
             out.push_str(&object.to_string());
             out.push('\n');
         } else {
-            for line in &self.text {
+            for line in text {
                 out.push_str(line);
                 out.push('\n');
             }
-            for warning in &self.warnings {
+            for warning in warnings {
                 out.push_str(&format!("warning [{}]: {}\n", warning.code, warning.message));
-                if let Some(advice) = warnings::advice(warning) {
+                if let Some(advice) = warnings::advice(warning.code) {
                     out.push_str(&format!("  {advice}\n"));
                 }
             }
         }
         let mut stdout = io::stdout().lock();
-        // A reader that went away (`| head`) is no failure of ours.
+        // A closed pipe (`| head`) is not an error of this program.
         let _ = stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush());
-        ExitCode::from(if everywhere.strict && !self.warnings.is_empty() {
+        ExitCode::from(if everywhere.strict && !warnings.is_empty() {
             3
         } else {
             0
@@ -101,21 +128,112 @@ impl Answer {
     }
 }
 
+/// Value of the key `schema` in the answer of `command`.
+fn schema_name(command: &str) -> String {
+    format!("stereology.{command}/1")
+}
+
+/// JSON Schema of a command's answer: its fields, and those that every answer has.
+pub fn schema_of<T: Fields>() -> Schema {
+    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    let mut schema = generator.into_root_schema_for::<T>();
+    let common = common_properties(T::COMMAND);
+    let object = schema.ensure_object();
+    let own = match object.shift_remove("properties") {
+        Some(Value::Object(own)) => own,
+        _ => Map::new(),
+    };
+    let required = match object.shift_remove("required") {
+        Some(Value::Array(own)) => own,
+        _ => Vec::new(),
+    };
+    let definitions = object.shift_remove("$defs");
+    object.insert("title".to_owned(), json!(format!("stereology {}", T::COMMAND)));
+    let required: Vec<Value> = ["schema", "warnings"]
+        .into_iter()
+        .map(Value::from)
+        .chain(required)
+        .collect();
+    let (before, after) = common;
+    let properties: Map<String, Value> = before.into_iter().chain(own).chain(after).collect();
+    object.insert("properties".to_owned(), Value::Object(properties));
+    object.insert("required".to_owned(), Value::Array(required));
+    if let Some(definitions) = definitions {
+        object.insert("$defs".to_owned(), definitions);
+    }
+    schema
+}
+
+/// Properties of every answer: those before a command's own fields, and those behind them.
+fn common_properties(command: &str) -> (Map<String, Value>, Map<String, Value>) {
+    let mut before = Map::new();
+    before.insert(
+        "schema".to_owned(),
+        json!({ "description": "Name and version of this format.", "const": schema_name(command) }),
+    );
+    let mut generator =
+        SchemaGenerator::from(SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true));
+    before.insert(
+        "warnings".to_owned(),
+        json!({
+            "description": "What deserves attention; docs/cli.md lists all codes.",
+            "type": "array",
+            "items": generator.subschema_for::<warnings::Record>(),
+        }),
+    );
+    let mut after = Map::new();
+    after.insert(
+        "seconds".to_owned(),
+        json!({
+            "description": "Elapsed time in seconds, of the whole command or by step. Printed only, never written into a file.",
+            "anyOf": [{ "type": "number" }, { "type": "object", "additionalProperties": { "type": "number" } }],
+        }),
+    );
+    (before, after)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Answer;
+    use super::{Answer, Fields, Notes, schema_of};
     use crate::warnings::Warning;
 
+    /// Test fields.
+    #[derive(serde::Serialize, schemars::JsonSchema)]
+    struct Packed {
+        particles: usize,
+        nonsense: f64,
+    }
+
+    impl Fields for Packed {
+        const COMMAND: &'static str = "pack";
+    }
+
     #[test]
-    fn the_schema_comes_first_and_time_is_left_out_of_files() {
-        let mut answer = Answer::new("pack");
-        answer.field("particles", 3).field("nonsense", f64::NAN).seconds(1.5);
-        answer
+    fn the_schema_comes_first_and_times_stay_out_of_files() {
+        let mut notes = Notes::default();
+        notes
+            .seconds(1.5)
             .warn(Warning::new("few-profiles", "3 profiles"))
             .warn(Warning::new("few-profiles", "3 profiles"));
+        let fields = Packed {
+            particles: 3,
+            nonsense: f64::NAN,
+        };
         assert_eq!(
-            answer.summary().to_string(),
+            Answer::new(&fields, notes).unwrap().summary().to_string(),
             r#"{"schema":"stereology.pack/1","warnings":[{"code":"few-profiles","message":"3 profiles"}],"particles":3,"nonsense":null}"#
         );
+    }
+
+    #[test]
+    fn a_json_schema_describes_the_common_keys_too() {
+        let schema = schema_of::<Packed>();
+        let keys: Vec<&str> = schema.as_object().unwrap()["properties"]
+            .as_object()
+            .unwrap()
+            .keys()
+            .map(String::as_str)
+            .collect();
+        assert_eq!(keys, ["schema", "warnings", "particles", "nonsense", "seconds"]);
     }
 }

@@ -1,11 +1,11 @@
-//! What the program says when it stops: one message (what, where, what to do) and an exit code.
+//! Errors of the program: one message (what failed, where, what to do) and an exit code.
 
 use std::fmt::{self, Display};
 use std::path::Path;
 
 use stereology::shape::{Body, BodyError};
 
-/// Why a command stopped, and the code the program exits with.
+/// Why a command failed, and the exit code of the program.
 #[derive(Debug)]
 pub struct Failure {
     code: u8,
@@ -13,7 +13,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// The data or the run failed: exit 1.
+    /// The data are unsuitable or the run failed: exit 1.
     pub fn run(message: impl Display) -> Self {
         Self {
             code: 1,
@@ -21,7 +21,7 @@ impl Failure {
         }
     }
 
-    /// The command was called wrongly: exit 2.
+    /// Wrong usage of the command: exit 2.
     pub fn usage(message: impl Display) -> Self {
         Self {
             code: 2,
@@ -29,15 +29,15 @@ impl Failure {
         }
     }
 
-    /// Stopped by Ctrl-C: exit 130, as shells expect.
+    /// Interrupted by Ctrl-C: exit 130, as shells expect.
     pub fn stopped() -> Self {
         Self {
             code: 130,
-            message: "stopped before the end; no output was changed".to_owned(),
+            message: "interrupted; no output was changed".to_owned(),
         }
     }
 
-    /// What the program exits with.
+    /// Exit code of the program.
     pub fn code(&self) -> u8 {
         self.code
     }
@@ -49,12 +49,12 @@ impl Display for Failure {
     }
 }
 
-/// A body from its description; a description that is none is wrong usage, a mesh that cannot be used a failed run.
+/// A body from its description. An invalid description is wrong usage; an unusable mesh is a failed run.
 pub fn body(spec: &str) -> Result<Body, Failure> {
     body_welding(spec, None)
 }
 
-/// [`body`], where vertices of a mesh file nearer than `weld` to each other are joined.
+/// [`body`], with vertices of a mesh file merged that are closer than `weld`.
 pub fn body_welding(spec: &str, weld: Option<f64>) -> Result<Body, Failure> {
     Body::parse_welding(spec, weld.unwrap_or(0.0)).map_err(|error| match error {
         BodyError::Length { .. }
@@ -66,13 +66,13 @@ pub fn body_welding(spec: &str, weld: Option<f64>) -> Result<Body, Failure> {
     })
 }
 
-/// Says of an error which file it is about, or that it is the user's to mend.
+/// Adds to an error which file or option it concerns.
 pub trait Explain<T> {
-    /// The run failed at `path`.
+    /// The run failed on the file `path`.
     fn at(self, path: &Path) -> Result<T, Failure>;
-    /// The run failed; the error says enough by itself.
+    /// The run failed; the error needs no addition.
     fn or_fail(self) -> Result<T, Failure>;
-    /// An option holds what it cannot hold.
+    /// The value of an option is invalid.
     fn or_usage(self, option: &str) -> Result<T, Failure>;
 }
 
@@ -80,7 +80,7 @@ impl<T, E: Display> Explain<T> for Result<T, E> {
     fn at(self, path: &Path) -> Result<T, Failure> {
         self.map_err(|error| {
             let (message, place) = (error.to_string(), path.display().to_string());
-            // Many errors of the libraries name the file already.
+            // Many library errors name the file already.
             Failure::run(if message.contains(&place) {
                 message
             } else {

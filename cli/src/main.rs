@@ -1,18 +1,18 @@
-//! The program `stereology`: a photograph of a cut through a material in, the solid it came from out.
+//! The program `stereology`: from a photograph of a cut through a material to the solid it came from.
 //!
-//! Every command is a module of [`commands`]: its arguments, its help and a thin `run` that calls the libraries and fills an [`answer::Answer`].
+//! Every command is a module of [`commands`]: its options with their help, and a thin `run` that calls the libraries and fills an
+//! [`answer::Answer`].
 
 mod answer;
-mod arguments;
 mod commands;
+mod everywhere;
 mod failure;
 mod manual;
-mod numbers;
 mod outputs;
 mod particle_files;
 mod particle_surfaces;
+mod program;
 mod progress;
-mod report;
 mod values;
 mod warnings;
 
@@ -21,13 +21,13 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches};
 
-use crate::arguments::{Invocation, Program};
 use crate::failure::Failure;
+use crate::program::{Command, Program, invocation};
 
 fn main() -> ExitCode {
     let matches = Program::command().get_matches();
     let program = Program::from_arg_matches(&matches).map(|mut program| {
-        program.everywhere.invocation = Invocation::of(&matches);
+        program.everywhere.invocation = invocation(&matches);
         program
     });
     let program = match program {
@@ -57,7 +57,11 @@ fn run(program: &Program) -> Result<ExitCode, Failure> {
             .build_global()
             .map_err(|error| Failure::run(format!("--threads {threads}: the threads cannot be started ({error})")))?;
     }
-    match commands::run(&program.command, everywhere)? {
+    if matches!(program.command, Command::Manual) {
+        print!("{}", manual::page());
+        return Ok(ExitCode::SUCCESS);
+    }
+    match program.command.run(everywhere)? {
         Some(answer) => {
             progress::go_on()?;
             Ok(answer.print(everywhere))

@@ -1,4 +1,4 @@
-//! Outputs: refused if they exist, written beside, renamed when complete.
+//! Outputs: refused if they exist, written under a temporary name, renamed when complete.
 
 use std::ffi::OsString;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::failure::{Explain, Failure};
 
 /// Refuses an output file that exists (unless `force`), is a folder, or whose folder is missing.
 ///
-/// Called before any work is done, so that an hour of computing does not end in a refusal.
+/// Call it before the computation, so that a long run does not end in a refusal.
 pub fn check_file(path: &Path, force: bool) -> Result<(), Failure> {
     let place = path.display();
     if path.is_dir() {
@@ -36,7 +36,7 @@ pub fn check_file(path: &Path, force: bool) -> Result<(), Failure> {
     }
 }
 
-/// As [`check_file`], for a volume, which may be a folder that `force` replaces.
+/// As [`check_file`], for a volume, which can be a folder that `force` replaces.
 pub fn check_volume(path: &Path, format: Format, force: bool) -> Result<(), Failure> {
     if format == Format::Zarr && force && path.join("zarr.json").is_file() {
         return Ok(());
@@ -50,12 +50,12 @@ pub fn check_volume(path: &Path, format: Format, force: bool) -> Result<(), Fail
     check_file(path, force)
 }
 
-/// Writes a text file whole or not at all.
+/// Writes a text file completely or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_atomically(path, |out| out.write_all(text.as_bytes())).at(path)
 }
 
-/// Writes a PNG whole or not at all.
+/// Writes a PNG completely or not at all.
 pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Failure> {
     write_atomically(path, |out| {
         PngEncoder::new(out)
@@ -70,12 +70,12 @@ pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Failure> {
     .at(path)
 }
 
-/// Writes indented JSON whole or not at all.
+/// Writes indented JSON completely or not at all.
 pub fn write_json(path: &Path, value: &Value) -> Result<(), Failure> {
     write_text(path, &format!("{value:#}\n"))
 }
 
-/// A folder of outputs that appears under its name only when complete.
+/// A folder of outputs that gets its name only when complete.
 #[derive(Debug)]
 pub struct OutputFolder {
     target: PathBuf,
@@ -86,8 +86,8 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Begins to write `target`, as `target.partial` beside it.
     ///
-    /// A folder with anything in it is refused; with `force` it is replaced by [`publish`](Self::publish), but only if it is an output of this program
-    /// (it has a `summary.json` of ours): nobody's home is replaced by mistake.
+    /// A folder that contains anything is refused. With `force`, [`publish`](Self::publish) replaces it, but only if it is an output of this program (it has
+    /// a `summary.json` of ours), so that no other folder is replaced by mistake.
     pub fn begin(target: &Path, force: bool) -> Result<Self, Failure> {
         let target = named(target)?;
         let place = target.display();
@@ -99,18 +99,18 @@ impl OutputFolder {
         if is_filled(&target).at(&target)? {
             if !force {
                 return Err(Failure::run(format!(
-                    "{place} already holds files; give another folder, or --force to replace it"
+                    "{place} already contains files; give another folder, or --force to replace it"
                 )));
             }
             if !is_ours(&target) {
                 return Err(Failure::run(format!(
-                    "{place} holds files, but no summary.json of this program, so --force does not replace it; give another folder"
+                    "{place} contains files but no summary.json of this program, so --force does not replace it; give another folder"
                 )));
             }
         }
         let partial = with_suffix(&target, ".partial");
         if partial.is_dir() {
-            // Left by a run that was killed.
+            // Left by an interrupted run.
             fs::remove_dir_all(&partial).at(&partial)?;
         }
         fs::create_dir_all(&partial)
@@ -123,12 +123,12 @@ impl OutputFolder {
         })
     }
 
-    /// Where to write the file `name` of the folder.
+    /// Path at which to write the file `name` of the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.partial.join(name)
     }
 
-    /// The folder is complete: gives it its name.
+    /// Gives the complete folder its name.
     pub fn publish(mut self) -> Result<PathBuf, Failure> {
         let old = with_suffix(&self.target, ".partial-old");
         let replacing = self.target.exists();
@@ -160,7 +160,7 @@ impl Drop for OutputFolder {
     }
 }
 
-/// The path with a last name, so that something can be written beside it (`.` has none).
+/// The path with a last component, so that something can be written beside it (`.` has none).
 fn named(path: &Path) -> Result<PathBuf, Failure> {
     if path.file_name().is_some() {
         // Without a slash at its end.

@@ -12,9 +12,9 @@ use crate::failure::Failure;
 
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C asks the running step to stop; a second one ends the program at once.
+/// Makes Ctrl-C stop the running step; a second Ctrl-C ends the program at once.
 pub fn stop_on_ctrl_c() {
-    // Without a handler Ctrl-C ends the program at once, which is safe too: outputs are renamed only when complete.
+    // Without a handler Ctrl-C ends the program at once. That is safe too, because outputs are renamed only when complete.
     let _ = ctrlc::set_handler(|| {
         if STOPPED.swap(true, Ordering::SeqCst) {
             std::process::exit(130);
@@ -31,7 +31,7 @@ pub fn stopped() -> bool {
     STOPPED.load(Ordering::SeqCst)
 }
 
-/// An error if Ctrl-C was pressed: to be asked before anything is published.
+/// An error if Ctrl-C was pressed; called before outputs get their final names.
 pub fn go_on() -> Result<(), Failure> {
     if stopped() { Err(Failure::stopped()) } else { Ok(()) }
 }
@@ -43,7 +43,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// Begins a step called `name`; its bar is seen only if stderr is a terminal and `quiet` is not set.
+    /// Begins a step called `name`; its bar is visible only if stderr is a terminal and `quiet` is not set.
     pub fn begin(name: &str, quiet: bool) -> Self {
         if quiet || !io::stderr().is_terminal() {
             return Self {
@@ -59,12 +59,12 @@ impl Step {
         Self { bar }
     }
 
-    /// A line above the bar, for people who watch.
-    pub fn say(&self, line: &str) {
+    /// Prints a line above the bar.
+    pub fn print(&self, line: &str) {
         self.bar.println(line);
     }
 
-    /// Told how far the step is (0 to 1); breaks after Ctrl-C.
+    /// Sets the progress of the step (0 to 1); breaks after Ctrl-C.
     pub fn at(&self, done: f64) -> ControlFlow<()> {
         self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
         if stopped() {
@@ -81,7 +81,7 @@ impl Drop for Step {
     }
 }
 
-/// The progress of several steps, one after the other, and how long each took.
+/// The progress of several consecutive steps, and the time each took.
 #[derive(Debug)]
 pub struct Stages {
     quiet: bool,
@@ -103,7 +103,7 @@ impl Stages {
         }
     }
 
-    /// Told which step is at work and how far it is; breaks after Ctrl-C.
+    /// Sets the running step and its progress; breaks after Ctrl-C.
     pub fn at(&self, name: &'static str, done: f64) -> ControlFlow<()> {
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         if running.step.as_ref().is_none_or(|(of, ..)| *of != name) {
@@ -116,7 +116,7 @@ impl Stages {
         }
     }
 
-    /// Ends the last step: seconds by step.
+    /// Ends the last step and returns the seconds by step.
     pub fn end(self) -> Vec<(&'static str, f64)> {
         let mut running = self.running.into_inner().unwrap_or_else(PoisonError::into_inner);
         running.end();

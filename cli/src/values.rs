@@ -1,4 +1,4 @@
-//! Values of options: positive numbers, lists, colours, shapes with their shares. A wrong value is wrong usage and says what is right.
+//! Values of options: positive numbers, lists, colours, shapes with their fractions. The message for a wrong value says what is allowed.
 
 use std::str::FromStr;
 
@@ -45,9 +45,9 @@ pub fn count(text: &str) -> Result<usize, String> {
 /// A number of bins, from 1 to 1000, or `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BinCount {
-    /// So many.
+    /// This many.
     Number(usize),
-    /// As many as the profiles bear.
+    /// As many as the number of profiles allows.
     Auto,
 }
 
@@ -62,16 +62,16 @@ impl FromStr for BinCount {
     }
 }
 
-/// The largest size of a particle: a length, or how it is found.
+/// The largest size of a particle: a length, or how it is estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaxSize {
-    /// Known.
+    /// A known length.
     Length(f64),
-    /// That of the largest profile.
+    /// The size of the largest profile.
     Profile,
-    /// The largest profile corrected for what it falls short of.
+    /// The size of the largest profile, corrected for its bias.
     Corrected,
-    /// Of highest likelihood.
+    /// The size of greatest likelihood.
     Likelihood,
 }
 
@@ -93,9 +93,9 @@ impl FromStr for MaxSize {
 /// A capping angle in degrees, or `fit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CappingAngle {
-    /// Known.
+    /// A known angle.
     Degrees(f64),
-    /// Of highest likelihood.
+    /// The angle of greatest likelihood.
     Fit,
 }
 
@@ -167,7 +167,7 @@ impl FromStr for BinderArgument {
             Ok(&[r, g, b]) => Ok(Self::Colour([r, g, b])),
             Ok(&[number @ 0..=7]) => Ok(Self::MainColour(usize::from(number))),
             _ => Err(
-                "a colour is three whole numbers from 0 to 255, such as 120,110,100; a main colour of the photograph one from 0 to 7"
+                "give a colour as three whole numbers from 0 to 255, such as 120,110,100, or a main colour of the photograph as one whole number from 0 to 7"
                     .to_owned(),
             ),
         }
@@ -253,12 +253,12 @@ impl FromStr for Extent {
     }
 }
 
-/// A particle shape and its share of the particles: `SHAPE` or `SHAPE=FRACTION`.
+/// A particle shape and its fraction of the particles: `SHAPE` or `SHAPE=FRACTION`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeShare {
     /// `sphere`, `box:A,B,C`, a mesh file, ...
     pub shape: String,
-    /// Share by number of particles, if given.
+    /// Fraction by number of particles, if given.
     pub fraction: Option<f64>,
 }
 
@@ -270,9 +270,9 @@ impl FromStr for ShapeShare {
             return Err("a shape is needed, such as sphere".to_owned());
         }
         match text.rsplit_once('=') {
-            // A file name may hold `=`: only a number after it is a share.
+            // A file name may contain `=`: only a number after it is a fraction.
             Some((shape, fraction)) if fraction.parse::<f64>().is_ok() => {
-                let fraction = positive(fraction).map_err(|error| format!("the share after `=`: {error}"))?;
+                let fraction = positive(fraction).map_err(|error| format!("the fraction after `=`: {error}"))?;
                 Ok(Self {
                     shape: shape.to_owned(),
                     fraction: Some(fraction),
@@ -286,7 +286,7 @@ impl FromStr for ShapeShare {
     }
 }
 
-/// Shares that sum to one; a shape without a share gets an equal part of what the others leave.
+/// Fractions that sum to one; shapes without a fraction share the remainder equally.
 pub fn shares(shapes: &[ShapeShare]) -> Result<Vec<f64>, String> {
     let missing = shapes.iter().filter(|shape| shape.fraction.is_none()).count();
     let given: f64 = shapes.iter().filter_map(|shape| shape.fraction).sum();
@@ -298,7 +298,7 @@ pub fn shares(shapes: &[ShapeShare]) -> Result<Vec<f64>, String> {
             .collect());
     }
     if given >= 1.0 {
-        return Err("the shares given sum to 1 or more and leave nothing for the shapes without one".to_owned());
+        return Err("the given fractions sum to 1 or more and leave nothing for the shapes without one".to_owned());
     }
     let rest = (1.0 - given) / missing as f64;
     Ok(shapes.iter().map(|shape| shape.fraction.unwrap_or(rest)).collect())

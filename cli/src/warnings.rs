@@ -1,44 +1,45 @@
-//! The warnings the program can give: fixed codes, what each means, and what to do about it.
+//! Warnings of the program: fixed codes, meanings and advice.
 
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 pub use stereology::metrics::Finding as Warning;
 
-/// Every code, in alphabetical order: (code, what it means, what to do). `docs/cli.md` and the report show this table.
+/// All codes in alphabetical order: (code, meaning, what to do). `docs/cli.md` and the report show this table.
 pub const CODES: &[(&str, &str, &str)] = &[
     (
         "alpha-over-white",
-        "Some of the photograph is transparent; it was laid over white.",
-        "Save the photograph without transparency if that is not meant.",
+        "Parts of the photograph are transparent; they were composited over white.",
+        "Save the photograph without transparency if this is not intended.",
     ),
     (
         "area-fraction",
-        "Less than 1 % or more than 70 % of the photograph are profiles.",
-        "Look at overlay.png; give the binder's colour with --binder, or import a label map with --labels FILE.",
+        "Profiles cover less than 1 % or more than 70 % of the photograph.",
+        "Look at overlay.png; give the colour of the binder with --binder, or import a label map with --labels FILE.",
     ),
     (
         "box-rounded",
         "The box's side was rounded to a whole number of periods of the texture, so that the solid repeats.",
-        "Nothing, unless you need exactly that side: then choose --box as a multiple of the texture's period.",
+        "Nothing, unless you need exactly that side; then give --box as a multiple of the texture's period.",
     ),
     (
         "clipped-labels",
-        "The largest label is exactly 255 or 65,535: the label map was probably cut off when it was saved.",
+        "The largest label is exactly 255 or 65,535: the label map was probably clipped when it was saved.",
         "Save the labels with more bits (u16 or u32) and import them again.",
     ),
     (
         "coarse-texture",
-        "A carved mesh has fewer triangles, or an atlas fewer pixels, than the texture asks for: it looks blurred.",
-        "More --triangles, a larger --atlas, or a larger --period so that the texture is coarser on the mesh.",
+        "A carved mesh has fewer triangles, or an atlas fewer pixels, than the texture requires: it looks blurred.",
+        "Give more --triangles, a larger --atlas, or a larger --period, which makes the texture coarser on the mesh.",
     ),
     (
         "constant-exemplar",
-        "The picture whose texture was asked for has one colour where it counts: there is no texture.",
-        "Nothing, if the material is that smooth; otherwise look at the picture.",
+        "The example image has a single colour in the relevant region, so it has no texture.",
+        "Nothing, if the material is smooth; otherwise check the image.",
     ),
     (
         "crowded-edges",
-        "Some edges of the mesh have more than two triangles. The reconstruction takes all of them as neighbours.",
-        "Nothing, or mend the mesh if that is not what you meant.",
+        "Some edges of the mesh have more than two triangles. The reconstruction treats all of them as neighbours.",
+        "Nothing, or repair the mesh if this is not intended.",
     ),
     (
         "edge-heavy",
@@ -47,92 +48,92 @@ pub const CODES: &[(&str, &str, &str)] = &[
     ),
     (
         "few-profiles",
-        "There are few profiles: every figure that follows from them is uncertain.",
+        "There are few profiles: all results that depend on them are uncertain.",
         "Use a photograph of a larger area, or fewer --bins.",
     ),
     (
         "few-profiles-in-bin",
-        "Some size bins hold fewer than five profiles: their densities are uncertain.",
+        "Some size bins contain fewer than five profiles: their densities are uncertain.",
         "Use fewer --bins, or photographs of a larger area.",
     ),
     (
         "few-samples",
-        "Too few pixels lie inside particles (or binder) to take the texture's coarse statistics from.",
+        "Too few pixels lie inside particles (or binder) to measure the coarse statistics of the texture.",
         "Nothing for fine textures; otherwise a photograph of higher resolution, or fewer --levels.",
     ),
     (
         "fewer-bins",
-        "More size bins were asked for than there are profiles: so many bins as profiles were used.",
+        "More size bins were requested than there are profiles: as many bins as profiles were used.",
         "Give fewer --bins, or --bins auto, or photographs of a larger area.",
     ),
     (
         "fines-left-out",
-        "The smallest sizes were left out of the packing, to keep the number of particles feasible.",
+        "The smallest sizes were left out of the packing to limit the number of particles.",
         "Give a smaller --box, or raise --min-size if they are not needed.",
     ),
     (
         "first-page",
         "The label TIFF has several pages; the first one was taken.",
-        "Save the page that belongs to the photograph alone.",
+        "Save only the page that belongs to the photograph.",
     ),
     (
         "fraction-mismatch",
-        "The particles' volume fraction by unfolding and the photograph's area fraction differ by more than 10 %, though on average they must agree.",
+        "The unfolded volume fraction and the area fraction of the photograph differ by more than 10 %, although their expectations are equal.",
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
     ),
     (
         "largest-uncorrected",
-        "The largest profiles are all of one size, so the largest particle size could not be extrapolated; the size of the largest profile was used.",
-        "Give --max-size as a length, or leave it out.",
+        "The largest profiles all have the same size, so the largest particle size could not be extrapolated; the size of the largest profile was used.",
+        "Give --max-size as a length, or omit it.",
     ),
     (
         "levels-reduced",
-        "The pyramid has fewer levels than asked for: the picture or the result is too small.",
-        "Use a larger picture, or fewer --levels.",
+        "The pyramid has fewer levels than requested: the image or the result is too small.",
+        "Use a larger image, or fewer --levels.",
     ),
     (
         "lost-labels",
-        "Some outlines of the label file hold no pixel of their own (points, lines, slivers, or covered by others).",
-        "Nothing, or correct them in the tool they come from.",
+        "Some outlines of the label file contain no pixel of their own (points, lines, slivers, or covered by others).",
+        "Nothing, or correct them in the tool that made them.",
     ),
     (
         "measured-as-voxels",
-        "Measurements lie outside the mesh, but are whole numbers that fit as numbers of voxels: they were taken as that.",
-        "Say --measured-in voxels or --measured-in mesh.",
+        "Measurements lie outside the mesh, but are valid voxel indices: they were taken as voxel indices.",
+        "Give --measured-in voxels or --measured-in mesh.",
     ),
     (
         "measured-moved",
         "Measurements just outside the mesh were moved to the nearest voxel inside.",
-        "Nothing for measurements on the surface; otherwise correct their places.",
+        "Nothing for measurements on the surface; otherwise correct their positions.",
     ),
     (
         "mesh-repaired",
         "The mesh was not quite a closed surface and was repaired.",
-        "Look at `repairs`; mend the mesh if that is not what you meant.",
+        "Read `repairs`; repair the mesh yourself if they are not intended.",
     ),
     (
         "near-minimum",
-        "Many profiles are hardly larger than the smallest that is counted: smaller ones are probably missed.",
-        "Use a photograph of higher resolution; the sizes below the threshold are not reported.",
+        "Many profiles are close to the smallest size that is counted: smaller ones are probably missed.",
+        "Use a photograph of higher resolution; sizes below the detection limit are not reported.",
     ),
     (
         "negative-bins",
-        "Some unfolded number densities came out negative and were set to zero.",
-        "Use as many --bins as the message names, a threshold (--min-size), or --method auto.",
+        "Some unfolded number densities were negative and were set to zero.",
+        "Use the number of --bins that the message names, a detection limit (--min-size), or --method auto.",
     ),
     (
         "no-binder",
-        "No single colour surrounds the particles: what is particle and what is binder is a guess.",
-        "Give the binder's colour with --binder R,G,B, or import a label map with --labels FILE.",
+        "No single colour surrounds the particles, so the separation of particles and binder is a guess.",
+        "Give the colour of the binder with --binder R,G,B, or import a label map with --labels FILE.",
     ),
     (
         "no-fringes",
-        "No fringe lies wholly inside a slice or the exemplar: lengths and windings could not be measured.",
+        "No fringe lies entirely inside a slice or the exemplar: lengths and tortuosities could not be measured.",
         "Nothing for textures without fringes; otherwise larger slices, or --period if the fringes are finer.",
     ),
     (
         "no-texture",
-        "Too few pixels lie inside the particles (or the binder) to learn their texture: they were left plain.",
+        "Too few pixels lie inside the particles (or the binder) to measure their texture: they have a uniform colour.",
         "Use a photograph of higher resolution.",
     ),
     (
@@ -142,87 +143,97 @@ pub const CODES: &[(&str, &str, &str)] = &[
     ),
     (
         "oscillating-bins",
-        "Densities of neighbouring bins swing up and down: the counts cannot carry so many bins.",
-        "Use as many --bins as the message names, --method auto, or photographs of a larger area.",
+        "Densities of neighbouring bins oscillate: there are too few profiles for that many bins.",
+        "Use the number of --bins that the message names, --method auto, or photographs of a larger area.",
     ),
     (
         "overlapping-labels",
-        "Outlines of the label file overlap; pixels in several went to the smallest.",
-        "Correct the outlines in the tool they come from if that is not meant.",
+        "Outlines of the label file overlap; pixels in several outlines were assigned to the smallest.",
+        "Correct the outlines in the tool that made them if this is not intended.",
     ),
     (
         "paper-normalisation",
-        "The paper's normalisation counts one profile a hit, but planes through this body show more.",
-        "Leave --paper out for densities; use it to compare with the paper's figures.",
+        "The paper's normalisation assumes one profile per intersecting plane, but this body shows more.",
+        "Omit --paper for densities; use it only for comparison with the paper.",
     ),
     (
         "range-guessed",
-        "The samples of a volume do not say which value is white; a range was taken from the data.",
-        "Give --range LOW,HIGH (or --exemplar-range) if black and white are other values.",
+        "The samples of a volume do not define which value is white; the range was taken from the data.",
+        "Give --range LOW,HIGH (or --exemplar-range) if black and white have other values.",
     ),
     (
         "seeds-added",
-        "Parts of the mesh hang together with no seed by voxels; each was given one.",
-        "Nothing, or a higher --resolution, at which thin parts hang together.",
+        "Some connected components of the voxels had no seed; each got one.",
+        "Nothing, or give a higher --resolution, at which thin parts are connected.",
     ),
     (
         "self-intersection",
-        "The mesh seems to cut through itself: sections show another number of profiles than its surface says.",
-        "Mend the mesh (a boolean union in a mesh editor).",
+        "The mesh probably intersects itself: the number of profiles on sections disagrees with the curvature of its surface.",
+        "Repair the mesh (a boolean union in a mesh editor).",
     ),
     (
         "sharp-relief",
-        "The displaced mesh cuts through itself.",
-        "Smaller k, or a profile that rises less (sqrt), or a finer mesh (--edge-length).",
+        "The displaced mesh intersects itself.",
+        "Use a smaller scale k, the function sqrt, or a finer mesh (--edge-length).",
     ),
     (
         "slices-left-out",
-        "The volume has more slices than are measured: they were taken at even distances.",
-        "Nothing, or a larger --at-most.",
+        "The volume has more slices than were measured; evenly spaced slices were taken.",
+        "Nothing, or give a larger --at-most.",
     ),
     (
         "small-labels",
-        "Labels smaller than the smallest area that counts were left out.",
+        "Labels smaller than the minimum area were left out.",
         "Lower --min-area to keep them.",
     ),
     (
         "split-label",
-        "A label of the imported map is in several pieces; it was kept as one profile.",
-        "Give each profile a label of its own if they are different particles.",
+        "A label of the imported map has several connected components; it was kept as one profile.",
+        "Give each component its own label if they are different particles.",
     ),
     (
         "threshold-moved",
-        "The smallest size lies inside a profile bin, all of which was left out.",
-        "Nothing, or choose --edges with an edge at --min-size.",
+        "The detection limit lies inside a profile bin; the whole bin was left out.",
+        "Nothing, or give --edges with an edge at --min-size.",
     ),
     (
         "unrealisable-distribution",
-        "The mesh cannot hold the contact distribution: some distances found no place and moved towards the interface.",
-        "More --units (the structure gets finer), or a distribution without the longest distances (contact --edit).",
+        "The mesh cannot have this contact distribution: some labels found no place and moved towards the interface.",
+        "Give more --units (a finer structure), or a distribution without the longest distances (contact --edit).",
     ),
     (
         "unstable-count",
-        "The number of profiles changes much when the thresholds move a little.",
+        "The number of profiles changes strongly with small changes of the thresholds.",
         "Look at overlay.png; import a label map with --labels FILE if the particles are not outlined well.",
     ),
     (
         "vague-binder",
-        "The binder's colours go over into those of particles: outlines are approximate, and particles of the binder's own colours are missed.",
-        "Look at overlay.png; give the binder's colour with --binder, or correct the labels by hand (--labels-out, --labels).",
+        "Binder and particle colours overlap: outlines are approximate, and particles with colours of the binder are missed.",
+        "Look at overlay.png; give the colour of the binder with --binder, or correct the labels by hand (--labels-out, --labels).",
     ),
 ];
 
-/// What to do about a warning.
-pub fn advice(warning: &Warning) -> Option<&'static str> {
-    CODES
-        .iter()
-        .find(|(code, ..)| *code == warning.code)
-        .map(|&(_, _, advice)| advice)
+/// What to do about a warning with this code.
+pub fn advice(code: &str) -> Option<&'static str> {
+    CODES.iter().find(|(of, ..)| *of == code).map(|&(_, _, advice)| advice)
 }
 
-/// `{"code", "message"}`.
-pub fn to_json(warning: &Warning) -> Value {
-    json!({ "code": warning.code, "message": warning.message })
+/// A warning in JSON.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Record {
+    /// Fixed code.
+    pub code: String,
+    /// What was found.
+    pub message: String,
+}
+
+impl From<&Warning> for Record {
+    fn from(warning: &Warning) -> Self {
+        Self {
+            code: warning.code.to_owned(),
+            message: warning.message.clone(),
+        }
+    }
 }
 
 #[cfg(test)]

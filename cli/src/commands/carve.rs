@@ -1,30 +1,32 @@
-//! `stereology carve`: a mesh with the solid's texture as colours of its vertices, or in a picture.
+//! `stereology carve`: a mesh with the solid's texture as vertex colours or as a texture image.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use nalgebra::Point3;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::shape::{TriangleMesh, read_mesh, write_coloured_mesh, write_textured_mesh};
 use stereology::volume::{BakeOptions, CarveError, CarveOptions, Solid, turned};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::render::Placement;
 use crate::commands::slice::open_solid;
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::counted;
 use crate::outputs::check_file;
 use crate::progress::Step;
 use crate::values::{count, positive};
 use crate::warnings::Warning;
+use stereology_report::counted;
 
-/// Carves a mesh from a finished solid: writes it with the solid's texture as colours of its vertices
+/// Carves a mesh from a finished solid and writes it with the solid's texture as vertex colours
 ///
-/// DIR is an output folder of `stereology synthesize`. The mesh (.obj, .stl, .ply) is placed with its longest side on one period of the solid, or as --period
-/// says, and keeps its coordinates. Its triangles are bisected until colours between the ends of each edge are what a viewer interpolates, or edges are as
-/// short as a pixel of the photograph, or there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
+/// DIR is an output folder of `stereology synthesize`. The longest side of the mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
+/// another length; its coordinates are kept. Triangles are bisected until linear interpolation along every edge reproduces the colours, until edges are as
+/// short as a pixel of the photograph, or until there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
 ///
-/// With --atlas the mesh keeps its own triangles, and the texture is baked into a picture inside the .glb: for games and the web.
+/// With --atlas the mesh keeps its triangles and the texture is baked into an image inside the .glb, as games and web viewers expect.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology carve out bunny.obj -o bunny.glb\n         stereology carve out crate.obj --atlas 2048 -o crate.glb"
@@ -36,21 +38,46 @@ pub struct Carve {
     /// Mesh to carve: any triangles, closed or not
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// Length in the mesh that one period of the solid takes [default: the mesh's longest side]
+    /// Length of one period of the solid, in units of the mesh [default: the mesh's longest side]
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     pub period: Option<f64>,
-    /// Turn the solid in the mesh, so that flat faces do not show its period
+    /// Rotate the solid within the mesh, so that flat faces do not show its period
     #[arg(long)]
     pub turned: bool,
-    /// Triangles at most
+    /// Maximum number of triangles
     #[arg(long, value_name = "N", default_value_t = CarveOptions::default().most_triangles, value_parser = count)]
     pub triangles: usize,
-    /// Keep the triangles and bake the texture into a square picture with a side of so many pixels, up to 16384; .glb only
+    /// Keep the triangles and bake the texture into a square image with this many pixels along a side, at most 16384; .glb only
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384), conflicts_with = "triangles")]
     pub atlas: Option<u32>,
     /// File: .glb or .ply
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+}
+
+/// JSON of `stereology carve`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CarveFields {
+    /// Vertices written.
+    vertices: usize,
+    /// Triangles written.
+    triangles: usize,
+    /// Edges that are longer than the texture requires; without --atlas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    coarse_edges: Option<usize>,
+    /// Charts of the atlas; with --atlas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    charts: Option<usize>,
+    /// Side of a pixel of the atlas, in the unit of length of the solid; with --atlas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    texel: Option<f64>,
+    /// Fraction of the atlas that charts cover; with --atlas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    atlas_used: Option<f64>,
+}
+
+impl Fields for CarveFields {
+    const COMMAND: &'static str = "carve";
 }
 
 impl Carve {
@@ -96,26 +123,30 @@ impl Carve {
         drop(step);
         write_coloured_mesh(&self.output, &carved.coloured).at(&self.output)?;
         let mesh = &carved.coloured.mesh;
-        let mut answer = Answer::new("carve");
-        answer
-            .field("vertices", mesh.vertices.len())
-            .field("triangles", mesh.triangles.len())
-            .field("coarse_edges", carved.coarse_edges)
-            .line(format!(
-                "{} triangles with colours written to {}",
-                counted(mesh.triangles.len() as u64),
-                self.output.display()
-            ));
+        let mut notes = Notes::default();
+        notes.line(format!(
+            "{} triangles with vertex colours written to {}",
+            counted(mesh.triangles.len() as u64),
+            self.output.display()
+        ));
         if carved.coarse_edges > 0 {
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "coarse-texture",
                 format!(
-                    "{} edges are longer than the texture asks for: {} triangles were not enough; give more --triangles",
+                    "{} edges are longer than the texture requires: {} triangles were not enough; give more --triangles",
                     carved.coarse_edges, self.triangles
                 ),
             ));
         }
-        Ok(answer)
+        let fields = CarveFields {
+            vertices: mesh.vertices.len(),
+            triangles: mesh.triangles.len(),
+            coarse_edges: Some(carved.coarse_edges),
+            charts: None,
+            texel: None,
+            atlas_used: None,
+        };
+        Answer::new(&fields, notes)
     }
 
     fn bake(
@@ -136,28 +167,30 @@ impl Carve {
             .map_err(|error| self.failure(error))?;
         drop(step);
         write_textured_mesh(&self.output, &baked.textured).at(&self.output)?;
-        let mut answer = Answer::new("carve");
-        answer
-            .field("vertices", mesh.vertices.len())
-            .field("triangles", mesh.triangles.len())
-            .field("charts", baked.charts)
-            .field("texel", baked.texel)
-            .field("atlas_used", baked.used)
-            .line(format!(
-                "{} triangles in {} charts of an atlas of {pixels} x {pixels} pixels written to {}",
-                counted(mesh.triangles.len() as u64),
-                counted(baked.charts as u64),
-                self.output.display()
-            ));
+        let mut notes = Notes::default();
+        notes.line(format!(
+            "{} triangles in {} charts of an atlas of {pixels} x {pixels} pixels written to {}",
+            counted(mesh.triangles.len() as u64),
+            counted(baked.charts as u64),
+            self.output.display()
+        ));
         if let Some(coarseness) = baked.coarseness.filter(|coarseness| *coarseness > COARSE) {
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "coarse-texture",
                 format!(
-                    "a pixel of the atlas is as wide as {coarseness:.1} of the photograph's: give a larger --atlas or a larger --period"
+                    "a pixel of the atlas is as wide as {coarseness:.1} pixels of the photograph; give a larger --atlas or a larger --period"
                 ),
             ));
         }
-        Ok(answer)
+        let fields = CarveFields {
+            vertices: mesh.vertices.len(),
+            triangles: mesh.triangles.len(),
+            coarse_edges: None,
+            charts: Some(baked.charts),
+            texel: Some(baked.texel),
+            atlas_used: Some(baked.used),
+        };
+        Answer::new(&fields, notes)
     }
 
     fn failure(&self, error: CarveError) -> Failure {
@@ -168,5 +201,5 @@ impl Carve {
     }
 }
 
-/// Pixels of the photograph along one of the atlas from which detail is missed.
+/// Pixels of the photograph per pixel of the atlas from which detail is lost.
 const COARSE: f64 = 2.0;

@@ -1,10 +1,11 @@
-//! `stereology contact`: contact distributions from pictures, volumes, formulas and files.
+//! `stereology contact`: contact distributions from images, volumes, formulas and files.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3, ArrayD, Ix3};
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::grid::read_npy;
 use stereology::imaging::otsu;
 use stereology::microgeometry::{
@@ -12,69 +13,72 @@ use stereology::microgeometry::{
 };
 use stereology::segment::{read_labels, read_photo};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{check_file, write_text};
 use crate::values::{bins, not_negative, positive};
 
-/// Measures how far the points of two regions lie from the interface between them: the distribution that `stereology displace` puts on meshes
+/// Measures the spherical contact distribution of two regions: the distances of their points to the interface between them
 ///
-/// IMAGE is a picture whose light pixels are the positive region and dark ones the negative; the threshold is Otsu's unless given. It may also be a volume (.npy, axes z, y, x: pores and material), a label map (--labels), or a contact distribution to edit (.json).
-/// Without IMAGE the distribution is made from formulas (--negative-law, --positive-law): uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION.
+/// `stereology displace` gives meshes a relief with this distribution. IMAGE is an image whose light pixels are the positive region and whose dark pixels are
+/// the negative region, separated by Otsu's threshold unless --threshold is given. It can also be a volume (.npy, axes z, y, x: pores and material), a label
+/// map (--labels), or a contact distribution to edit (.json). Without IMAGE the distribution follows from formulas (--negative-law, --positive-law):
+/// uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION.
 ///
-/// Distances are measured from the interface, which runs half way between pixels; what the picture's border hides is estimated. --counting paper does as Schroeder et al. 2005 did: from pixel to pixel, in whole pixels, borders ignored.
+/// Distances are measured from the interface, which runs half way between pixels, and are corrected for the part that the border of the image hides.
+/// --counting paper measures as Schroeder et al. 2005: from pixel to pixel, in whole pixels, without a correction at the border.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology contact --negative-law exponential:2 --positive-law disc:6 --share 0.4 -o cells.json\n          stereology contact gravel.png --edit 5=0 --edit -1=0.2 -o edited.json"
 )]
 pub struct Contact {
-    /// Picture, volume (.npy), label map, or a contact distribution (.json)
+    /// Image, volume (.npy), label map, or contact distribution (.json)
     #[arg(value_name = "IMAGE", required_unless_present = "positive_law")]
     pub image: Option<PathBuf>,
-    /// Grey value, 0 to 255: pixels above it are positive [default: Otsu's]
+    /// Grey value, 0 to 255; pixels above it are positive [default: Otsu's threshold]
     #[arg(long, value_name = "T", value_parser = threshold)]
     pub threshold: Option<f64>,
     /// IMAGE is a label map: all labels but 0 are positive
     #[arg(long, conflicts_with = "threshold")]
     pub labels: bool,
-    /// Bins of the region with the largest distance [default: a pixel each]
+    /// Number of bins of the region with the largest distance [default: one per pixel]
     #[arg(long, value_name = "N", value_parser = bins)]
     pub bins: Option<usize>,
-    /// Side of a pixel in distribution units
+    /// Side of a pixel, in units of the distribution
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
     pub pixel_size: f64,
-    /// How distances are counted
+    /// How distances are measured
     #[arg(long, value_enum, default_value_t = Counting::Interface)]
     pub counting: Counting,
-    /// Exchange the regions
+    /// Swap the positive and the negative region
     #[arg(long)]
     pub invert: bool,
-    /// Give a bin another share before all are normalised: 0, 1, ... positive region, -1, -2, ... negative
+    /// Set the fraction of a bin, before all are normalised: bins 0, 1, ... are the positive region, -1, -2, ... the negative; may be repeated
     #[arg(long, value_name = "BIN=SHARE", value_parser = edit, allow_hyphen_values = true)]
     pub edit: Vec<(i64, f64)>,
-    /// Law of the negative region's distances, without IMAGE
+    /// Distribution of distances in the negative region, without IMAGE
     #[arg(long, value_name = "LAW", requires = "positive_law", conflicts_with = "image")]
     pub negative_law: Option<Law>,
-    /// Law of the positive region's distances, without IMAGE
+    /// Distribution of distances in the positive region, without IMAGE
     #[arg(long, value_name = "LAW", requires = "negative_law", conflicts_with = "image")]
     pub positive_law: Option<Law>,
-    /// Share of the positive region, with laws
+    /// Fraction of the positive region, with --negative-law and --positive-law
     #[arg(long, value_name = "PHI", default_value_t = 0.5, value_parser = crate::values::share)]
     pub share: f64,
-    /// File for the distribution: .json
+    /// File for the distribution (.json)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 }
 
-/// How distances are counted.
+/// How distances are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Counting {
-    /// From the interface; what the border hides is estimated
+    /// From the interface, corrected for the part hidden by the border
     Interface,
-    /// From the interface, as seen: for pictures of the whole structure
+    /// From the interface, without correction: for images of a whole structure
     Seen,
-    /// From pixel to pixel in whole pixels, as in the paper
+    /// From pixel to pixel, in whole pixels, as in the paper
     Paper,
 }
 
@@ -88,14 +92,35 @@ fn threshold(text: &str) -> Result<f64, String> {
 fn edit(text: &str) -> Result<(i64, f64), String> {
     let parts = text.split_once('=');
     let parsed = parts.and_then(|(bin, share)| Some((bin.trim().parse().ok()?, not_negative(share).ok()?)));
-    parsed.ok_or_else(|| "a bin and its share are needed, such as 3=0.1 or -1=0".to_owned())
+    parsed.ok_or_else(|| "a bin and its fraction are needed, such as 3=0.1 or -1=0".to_owned())
 }
 
-/// What was found besides the distribution.
+/// A distribution and how it was measured.
 struct Source {
     of: ContactDistribution,
     threshold: Option<f64>,
     pixels: Option<usize>,
+}
+
+/// JSON of `stereology contact`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ContactFields {
+    /// Width of a bin, in units of the distribution.
+    bin_width: f64,
+    /// Fraction of points in each bin of the negative region, from the interface outwards.
+    negative: Vec<f64>,
+    /// Fraction of points in each bin of the positive region, from the interface outwards.
+    positive: Vec<f64>,
+    /// Fraction of the positive region.
+    positive_share: f64,
+    /// Grey value above which pixels are positive; null if no threshold was used.
+    threshold: Option<f64>,
+    /// Pixels or voxels measured; null if nothing was measured.
+    pixels: Option<usize>,
+}
+
+impl Fields for ContactFields {
+    const COMMAND: &'static str = "contact";
 }
 
 impl Contact {
@@ -118,26 +143,27 @@ impl Contact {
             .try_fold(of, |of, &(bin, share)| of.edited(bin, share))
             .or_usage("--edit")?;
         write_text(&self.output, &of.to_json())?;
-        let mut answer = Answer::new("contact");
-        answer
-            .field("bin_width", of.bin_width())
-            .field("negative", of.negative())
-            .field("positive", of.positive())
-            .field("positive_share", of.positive_share())
-            .field("threshold", threshold.map_or(Value::Null, |t| json!(t)))
-            .field("pixels", pixels)
-            .line(format!(
-                "positive region {:.1} %, distances up to {:.4}; negative {:.1} %, up to {:.4} -> {}",
-                100.0 * of.positive_share(),
-                of.positive().len() as f64 * of.bin_width(),
-                100.0 - 100.0 * of.positive_share(),
-                of.negative().len() as f64 * of.bin_width(),
-                self.output.display()
-            ));
+        let mut notes = Notes::default();
+        notes.line(format!(
+            "positive region {:.1} %, distances up to {:.4}; negative region {:.1} %, up to {:.4} -> {}",
+            100.0 * of.positive_share(),
+            of.positive().len() as f64 * of.bin_width(),
+            100.0 - 100.0 * of.positive_share(),
+            of.negative().len() as f64 * of.bin_width(),
+            self.output.display()
+        ));
         if let Some(threshold) = threshold {
-            answer.line(format!("grey values above {threshold} are positive"));
+            notes.line(format!("grey values above {threshold} are positive"));
         }
-        Ok(answer)
+        let fields = ContactFields {
+            bin_width: of.bin_width(),
+            negative: of.negative().to_vec(),
+            positive: of.positive().to_vec(),
+            positive_share: of.positive_share(),
+            threshold,
+            pixels,
+        };
+        Answer::new(&fields, notes)
     }
 
     fn measure(&self, image: &Path) -> Result<Source, Failure> {
@@ -198,20 +224,20 @@ impl Contact {
                 let mut counts = [0_u64; 256];
                 values.for_each(|level| counts[usize::from(level)] += 1);
                 otsu(&counts)
-                    .ok_or("all pixels have one grey value: there are no two regions to measure distances between")
+                    .ok_or("all pixels have the same grey value, so there are no two regions")
                     .at(image)
             }
         }
     }
 }
 
-/// A contact distribution from its file.
+/// Reads a contact distribution.
 pub fn read_contact(path: &Path) -> Result<ContactDistribution, Failure> {
     let text = std::fs::read_to_string(path).at(path)?;
     ContactDistribution::from_json(&text).at(path)
 }
 
-/// Grey values of a volume: u8 as they are, other types stretched from their least to their largest value.
+/// Grey values of a volume: u8 unchanged, floating point scaled from its least to its greatest value.
 fn volume(path: &Path) -> Result<Array3<u8>, Failure> {
     let three = |n: usize| format!("has {n} axes; a volume has three: z, y, x");
     let grey: ArrayD<u8> = match read_npy::<u8>(path) {

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::grid::write_atomically;
 use stereology::microgeometry::{
     Design, EdgeCensus, Method, Metric, MicrogeometryError, Offset, ReconstructOptions, Reconstruction, Weighting,
@@ -16,22 +17,25 @@ use stereology::shape::{
     write_coloured_mesh, write_mesh,
 };
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::contact::read_contact;
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::counted;
 use crate::outputs::{check_file, write_text};
 use crate::progress::Step;
 use crate::values::{count, positive};
 use crate::warnings::Warning;
+use stereology_report::counted;
 
-/// Puts a random relief on a mesh whose distances from ridge to valley are distributed as in a picture
+/// Displaces a mesh by a random relief with a given spherical contact distribution
 ///
-/// MESH (.obj, .ply, .stl; closed or not, in one piece or several) is scaled so that its longest box side is 2 U units of the contact distribution. Every triangle gets a signed distance to the interface between two regions (a label), so that
-/// labels are distributed as FILE says and no two differ by more than the distance over the surface; vertices then move along their normals by s k f(|label|) halves of the longest box side. Another --seed is another relief of the same kind.
+/// MESH (.obj, .ply, .stl; closed or open, with one or several connected components) is scaled so that the longest side of its bounding box is 2 U units of the
+/// contact distribution. Every triangle gets a label: a signed distance to the interface between two regions. The labels follow the distribution in FILE, and
+/// no two differ by more than their distance over the surface. Each vertex then moves along its normal by s k f(|label|), in halves of the longest side of the
+/// bounding box. Another --seed gives another relief of the same kind.
 ///
-/// The mesh must be fine enough for the relief: edges about as long as a bin is wide (--edge-length). S,K,F is a direction (out, in, none), a scale (0.01 to 0.05 are usual) and a profile: x (sharp), sqrt (rounded), or a table such as 0=0;2=0;3=1.
+/// The mesh must be fine enough for the relief: edges about as long as the width of a bin (--edge-length). S,K,F is a direction s (out, in, none), a scale k
+/// (typically 0.01 to 0.05) and a function f: x (sharp), sqrt (rounded), or a table such as 0=0;2=0;3=1.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology displace bust.obj --contact contact.json --units 60 --negative in,0.02,sqrt --positive out,0.03,sqrt -o relief.glb\n          stereology displace bust.obj --contact contact.json --preset fig8-coral -o coral.ply\n          stereology displace vase.obj --design design.json --seed 7 -o vase7.glb"
@@ -43,16 +47,16 @@ pub struct Displace {
     /// Contact distribution, written by `stereology contact`
     #[arg(long, value_name = "FILE", required_unless_present = "design")]
     pub contact: Option<PathBuf>,
-    /// Half the mesh's longest box side in distribution units: more units, finer structure
+    /// Half the longest side of the mesh's bounding box, in units of the distribution: more units give a finer structure
     #[arg(long, value_name = "U", required_unless_present_any = ["design", "preset"], value_parser = positive)]
     pub units: Option<f64>,
-    /// A design of `stereology explore` or --design-out: everything in one file; other options overrule it
+    /// Design from `stereology explore` or --design-out, which holds all settings; other options override it
     #[arg(long, value_name = "JSON")]
     pub design: Option<PathBuf>,
-    /// Units and offsets of a row of the paper's table 1; a wrong name lists them
+    /// Units and displacements of a row of the paper's table 1; an unknown name lists them
     #[arg(long, value_name = "NAME", conflicts_with = "design")]
     pub preset: Option<String>,
-    /// How labels are given [default: tight]
+    /// How labels are assigned [default: tight]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
     /// Displacement of the negative region [default: in,0.02,sqrt]
@@ -61,54 +65,54 @@ pub struct Displace {
     /// Displacement of the positive region [default: out,0.03,sqrt]
     #[arg(long, value_name = "S,K,F", allow_hyphen_values = true)]
     pub positive: Option<Offset>,
-    /// Split triangles until no edge is longer, in mesh units
+    /// Subdivide triangles until no edge is longer than this, in units of the mesh
     #[arg(long, value_name = "E", value_parser = positive)]
     pub edge_length: Option<f64>,
-    /// How triangles are split
+    /// Subdivision scheme
     #[arg(long, value_enum, default_value_t = Scheme::Midpoint)]
     pub subdivision: Scheme,
-    /// What a triangle counts for [default: area; count for --method paper]
+    /// Weight of a triangle in the distribution [default: area; count for --method paper]
     #[arg(long, value_enum)]
     pub weight: Option<Weight>,
-    /// Draw structures out: an axis and how many times as long they are along it as across
+    /// Stretch structures along an axis by a factor
     #[arg(long, value_name = "X,Y,Z,FACTOR", value_parser = stretch, allow_hyphen_values = true)]
     pub stretch: Option<([f64; 3], f64)>,
-    /// Simplify the result to so many triangles, small ones where the relief is rich
+    /// Simplify the result to this many triangles, with small ones where the relief is rich
     #[arg(long, value_name = "N", value_parser = count)]
     pub triangles: Option<usize>,
-    /// Colours of the vertices, in .glb and .ply
+    /// Vertex colours, in .glb and .ply
     #[arg(long, value_enum, default_value_t = Colours::None)]
     pub colours: Colours,
-    /// File for the labels: triangle, label
+    /// Also write the labels, with columns triangle and label
     #[arg(long, value_name = "CSV")]
     pub labels_out: Option<PathBuf>,
-    /// File for the design: all choices made, to be used again with --design
+    /// Also write the design: all settings, for --design
     #[arg(long, value_name = "JSON")]
     pub design_out: Option<PathBuf>,
-    /// File: .obj, .ply, .glb or .stl
+    /// Mesh file to write: .obj, .ply, .glb or .stl
     #[arg(short, long, value_name = "MESH")]
     pub output: PathBuf,
 }
 
-/// How labels are given.
+/// How labels are assigned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArgument {
-    /// Looks ahead and packs tightly
+    /// Look ahead and pack labels tightly
     Tight,
-    /// To the letter of the paper
+    /// Exactly as in the paper
     Paper,
 }
 
-/// How triangles are split.
+/// Subdivision scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scheme {
-    /// At the middles of edges that are too long: the same surface
+    /// At the midpoints of long edges: the surface is unchanged
     Midpoint,
-    /// By Loop's scheme, which rounds the mesh
+    /// Loop's scheme, which smooths the surface
     Loop,
 }
 
-/// What a triangle counts for.
+/// Weight of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Weight {
     /// Its area
@@ -117,14 +121,14 @@ pub enum Weight {
     Count,
 }
 
-/// Colours of vertices.
+/// Vertex colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Colours {
     /// Grey
     None,
-    /// Red and blue: positive and negative
+    /// Red for the positive region, blue for the negative
     Region,
-    /// From blue through white to red, by the label
+    /// From blue through white to red, by label
     Label,
 }
 
@@ -134,6 +138,50 @@ fn stretch(text: &str) -> Result<([f64; 3], f64), String> {
         [x, y, z, factor] if factor > 0.0 && x.hypot(y).hypot(z) > 0.0 => Ok(([x, y, z], factor)),
         _ => Err("an axis and a factor above zero are needed, such as 0,1,0,4".to_owned()),
     }
+}
+
+/// JSON of `stereology displace`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct DisplaceFields {
+    /// Triangles that were labelled.
+    triangles: usize,
+    /// Triangles written, after simplification.
+    triangles_written: usize,
+    /// Fraction of the triangles for which the distribution had no label left.
+    left_over_fraction: f64,
+    /// Fraction of the labels that are in another bin than requested.
+    misplaced_fraction: f64,
+    /// Pairs of labels that differ by more than their distance over the surface.
+    violations: usize,
+    /// Wasserstein-1 distance of the labels from the distribution, in bins.
+    emd_labels: f64,
+    /// The same for distances measured on the finished mesh; null if there is only one region.
+    emd_measured: Option<f64>,
+    /// Bins that could not be filled.
+    shortfalls: Vec<ShortfallRow>,
+    /// Connected components of the mesh.
+    pieces: usize,
+    /// Edges with one triangle.
+    border_edges: usize,
+    /// Edges with more than two triangles.
+    crowded_edges: usize,
+    /// Pairs of triangles of the displaced mesh that intersect; counted up to 1000.
+    self_intersections: usize,
+}
+
+/// A bin that could not be filled.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ShortfallRow {
+    /// Bin: 0, 1, ... in the positive region, -1, -2, ... in the negative.
+    bin: i64,
+    /// Requested fraction of the mesh.
+    wanted: f64,
+    /// Fraction of the mesh in the bin.
+    got: f64,
+}
+
+impl Fields for DisplaceFields {
+    const COMMAND: &'static str = "displace";
 }
 
 impl Displace {
@@ -154,7 +202,7 @@ impl Displace {
         let mut mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         mesh.weld();
         if let Some(edge_length) = design.edge_length {
-            // Kept in halves of the box side, so that a design fits any mesh.
+            // A design stores the length in halves of the box side, so that it fits any mesh.
             let scheme = match self.subdivision {
                 Scheme::Midpoint => Subdivision::Midpoint,
                 Scheme::Loop => Subdivision::Loop,
@@ -189,21 +237,24 @@ impl Displace {
         )?;
         let census = EdgeCensus::of(&mesh);
         let crossings = self_intersections(&relief);
-        Ok(self.tell(&made, &relief, census, crossings, began))
+        self.answer(&made, &relief, census, crossings, began)
     }
 
-    /// What is to be made: from the design, the preset, and the options, of which the later overrule the earlier.
+    /// The settings: the design, overridden by the preset, overridden by the options.
     fn choices(&self, everywhere: &Everywhere) -> Result<Design, Failure> {
-        let preset = match &self.preset {
-            None => None,
-            Some(name) => {
-                let all = presets();
-                let names: Vec<&str> = all.iter().map(|preset| preset.name).collect();
-                let names = names.join(", ");
-                let found = all.into_iter().find(|preset| preset.name == name.as_str());
-                Some(found.ok_or_else(|| Failure::usage(format!("--preset {name}: there are {names}")))?)
-            }
-        };
+        let preset =
+            match &self.preset {
+                None => None,
+                Some(name) => {
+                    let all = presets();
+                    let names: Vec<&str> = all.iter().map(|preset| preset.name).collect();
+                    let names = names.join(", ");
+                    let found = all.into_iter().find(|preset| preset.name == name.as_str());
+                    Some(found.ok_or_else(|| {
+                        Failure::usage(format!("--preset {name} is unknown; the presets are {names}"))
+                    })?)
+                }
+            };
         let mut design = match (&self.design, &self.contact) {
             (Some(path), _) => {
                 let text = std::fs::read_to_string(path).at(path)?;
@@ -284,41 +335,49 @@ impl Displace {
         write_coloured_mesh(&self.output, &coloured).at(&self.output)
     }
 
-    fn tell(
+    fn answer(
         &self,
         made: &Reconstruction,
         relief: &TriangleMesh,
         census: EdgeCensus,
         crossings: usize,
         began: Instant,
-    ) -> Answer {
-        let mut answer = Answer::new("displace");
-        let shortfalls: Vec<_> = made
-            .shortfalls
-            .iter()
-            .map(|short| json!({"bin": short.bin, "wanted": short.wanted, "got": short.got}))
-            .collect();
-        answer
-            .field("triangles", made.labels.len())
-            .field("triangles_written", relief.triangles.len())
-            .field("left_over_fraction", made.left_over)
-            .field("misplaced_fraction", made.misplaced)
-            .field("violations", made.violations)
-            .field("emd_labels", made.emd_labels)
-            .field("emd_measured", made.emd_measured)
-            .field("shortfalls", shortfalls)
-            .field("pieces", made.pieces)
-            .field("border_edges", census.border)
-            .field("crowded_edges", census.crowded)
-            .field("self_intersections", crossings)
+    ) -> Result<Answer, Failure> {
+        let shortfalls = made.shortfalls.iter().map(|short| ShortfallRow {
+            bin: short.bin,
+            wanted: short.wanted,
+            got: short.got,
+        });
+        let fields = DisplaceFields {
+            triangles: made.labels.len(),
+            triangles_written: relief.triangles.len(),
+            left_over_fraction: made.left_over,
+            misplaced_fraction: made.misplaced,
+            violations: made.violations,
+            emd_labels: made.emd_labels,
+            emd_measured: made.emd_measured,
+            shortfalls: shortfalls.collect(),
+            pieces: made.pieces,
+            border_edges: census.border,
+            crowded_edges: census.crowded,
+            self_intersections: crossings,
+        };
+        let mut notes = Notes::default();
+        notes
             .seconds(began.elapsed().as_secs_f64())
             .line(format!(
-                "{} triangles labelled, {:.2} % left over, {:.2} % of the labels in another bin than asked for; labels {:.3} bins from the distribution, distances measured again {}",
+                "{} triangles labelled, {:.2} % of them after all labels of the distribution were used; {:.2} % of the labels are in another bin than requested",
                 counted(made.labels.len() as u64),
                 100.0 * made.left_over,
-                100.0 * made.misplaced,
+                100.0 * made.misplaced
+            ))
+            .line(format!(
+                "distance from the distribution in bins: {:.3} for the labels, {}",
                 made.emd_labels,
-                made.emd_measured.map_or_else(|| "none: one region only".to_owned(), |emd| format!("{emd:.3}")),
+                made.emd_measured.map_or_else(
+                    || "not measurable on the mesh, which has one region only".to_owned(),
+                    |emd| format!("{emd:.3} measured on the mesh")
+                ),
             ))
             .line(format!(
                 "{} triangles written to {}",
@@ -326,49 +385,49 @@ impl Displace {
                 self.output.display()
             ));
         if census.border > 0 {
-            answer.line(format!(
-                "the mesh is open: {} edges have one triangle; distances end there",
+            notes.line(format!(
+                "the mesh is open: {} edges have one triangle, where distances end",
                 counted(census.border as u64)
             ));
         }
         if made.pieces > 1 {
-            answer.line(format!(
-                "{} pieces, each with its share of the distribution",
+            notes.line(format!(
+                "{} connected components, each with its part of the distribution",
                 made.pieces
             ));
         }
         if census.crowded > 0 {
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "crowded-edges",
                 format!("{} edges have more than two triangles", census.crowded),
             ));
         }
         if crossings > 0 {
             let at_least = if crossings >= 1000 { "at least " } else { "" };
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "sharp-relief",
-                format!("{at_least}{crossings} pairs of triangles of the displaced mesh cross each other"),
+                format!("{at_least}{crossings} pairs of triangles of the displaced mesh intersect"),
             ));
         }
-        if made.misplaced > TELL {
-            answer.warn(Warning::new(
+        if made.misplaced > WARN_MISPLACED {
+            notes.warn(Warning::new(
                 "unrealisable-distribution",
                 format!(
-                    "{:.1} % of the labels are not in the bins the distribution asks for; the first that could not be filled is bin {}",
+                    "{:.1} % of the labels are not in the bins that the distribution requires; the first bin that could not be filled is bin {}",
                     100.0 * made.misplaced,
                     made.shortfalls.first().map_or(0, |short| short.bin)
                 ),
             ));
         }
-        answer
+        Answer::new(&fields, notes)
     }
 }
 
-/// Share of labels in other bins from which it is told.
-const TELL: f64 = 0.02;
+/// Fraction of labels in other bins above which there is a warning.
+const WARN_MISPLACED: f64 = 0.02;
 
 impl Colours {
-    /// Colour of a vertex with value `x`, where `far` is as far from the interface as it goes.
+    /// Colour of a vertex with value `x`; `far` is the largest distance from the interface.
     fn of(self, x: f64, far: f64) -> [f32; 4] {
         let share = (x.abs() / far).sqrt().min(1.0) as f32;
         let [r, g, b] = match (self, x < 0.0) {
@@ -386,7 +445,7 @@ fn ends_in(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|of| of.eq_ignore_ascii_case(ending))
 }
 
-/// Half the longest box side; 1 for a mesh without extent, which is refused later.
+/// Half the longest side of the bounding box; 1 for a mesh without extent, which is refused later.
 fn half_side(mesh: &TriangleMesh) -> f64 {
     let side = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).max());
     if side > 0.0 { 0.5 * side } else { 1.0 }

@@ -1,4 +1,4 @@
-//! `stereology exemplar`: a solid from one picture without particles.
+//! `stereology exemplar`: a solid from an image of a material without separate particles.
 
 mod given;
 
@@ -9,81 +9,84 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use image::RgbImage;
 use ndarray::{Array2, Array3, Axis};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::exemplar::{self, Domain, Exemplar as Picture, Solid, SolidError, SolidOptions, synthesize_solid};
 use stereology::grid::{Element, Format, VolumeShape, write_volume};
 use stereology::segment::read_photo;
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::significant;
 use crate::outputs::check_file;
 use crate::progress::{Step, go_on, stopped};
 use crate::values::{Extent, count};
+use stereology_report::significant;
 
-/// Makes a solid whose slices look like a picture, for materials without separate particles
+/// Synthesises a solid whose slices look like an image, for materials without separate particles
 ///
-/// Laminar carbons, wood, sediments, porous rock, gravel. Rows of the first IMAGE run along z and its columns along x: it shows the slices of constant y. A second IMAGE
-/// (or the first again) shows the slices of constant x, rows along z, columns along y; with --views 3 a third (or the last) those of constant z, rows along y, columns along x.
-/// Layered materials: --views 2, layers horizontal in the picture. All pictures at the same scale; the solid has their scale.
+/// For example laminar carbons, wood, sediments, porous rock and gravel. Rows of the first IMAGE run along z and its columns along x: it shows slices of constant
+/// y. A second IMAGE (or the first one) shows slices of constant x, with rows along z and columns along y. With --views 3 a third IMAGE (or the last one) shows
+/// slices of constant z, with rows along y and columns along x. For layered materials use --views 2 and an image with horizontal layers. All images must have
+/// the same scale, which is also the scale of the solid.
 ///
-/// The solid repeats without a seam unless --open. A picture of exactly two greys is taken as a map of two phases, whose fractions the solid has exactly (--kind picture if it is none).
-/// wei-levoy, kopf and chen-wang run as in urs-2012, voxel by voxel along --scan; best is ours. Judge the result with `stereology measure`.
+/// The solid repeats without a seam unless --open is given. An image with exactly two grey levels is taken as a map of two phases, and the solid has exactly
+/// their fractions (--kind picture prevents this). The methods wei-levoy, kopf and chen-wang follow Urs et al. 2012, voxel by voxel along --scan; best is our own
+/// method. Measure the similarity of the result with `stereology measure`.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology exemplar fringes.png --views 2 --size 128 -o carbon.npy\n         stereology measure fringes.png carbon.npy --slices xz,yz"
 )]
 pub struct Exemplar {
-    /// Picture of the material; or two or three, one an axis: slices of constant y, x, z
+    /// Image of the material; or two or three, one per axis: slices of constant y, x, z
     #[arg(value_name = "IMAGE", required = true, num_args = 1..=3)]
     pub images: Vec<PathBuf>,
-    /// Voxels: N or NZ,NY,NX
+    /// Number of voxels: N or NZ,NY,NX
     #[arg(long, value_name = "N[,N,N]")]
     pub size: Extent,
-    /// How the solid is made
+    /// Synthesis method
     #[arg(long, value_enum, default_value_t = Method::Best)]
     pub method: Method,
-    /// Order in which the sequential solver visits the voxels
+    /// Order in which the sequential solver visits voxels
     #[arg(long, value_enum, default_value_t = Scan::Hilbert)]
     pub scan: Scan,
-    /// 2: slices of constant y and x look like the pictures (layers); 3: those of constant z too [default: 3; as many as pictures, if two or three]
+    /// 2: slices of constant y and x look like the images (layers); 3: slices of constant z too [default: 3; with two or three images, their number]
     #[arg(long, value_name = "N", value_parser = views)]
     pub views: Option<exemplar::Views>,
-    /// Voxel by voxel, or all at once [default: batch for best, else sequential]
+    /// Whether voxels are updated one after the other or all at once [default: batch for best, otherwise sequential]
     #[arg(long, value_enum)]
     pub solver: Option<Solver>,
-    /// How the picture's neighbourhood most like one of the solid is found
+    /// How the most similar neighbourhood of the image is found
     #[arg(long, value_enum, default_value_t = Search::KCoherence)]
     pub search: Search,
-    /// Levels, each half as fine as the one before [default: by the size of the picture's features]
+    /// Number of resolution levels, each half as fine as the one before [default: depends on the size of the image's features]
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
-    /// Side of the neighbourhood, pixels, odd
+    /// Side of the neighbourhood in pixels, odd
     #[arg(long, value_name = "PIXELS", default_value_t = 7)]
     pub neighbourhood: usize,
-    /// Only what was visited before counts in a neighbourhood (sequential solver)
+    /// Compare only voxels visited before (causal neighbourhood; sequential solver)
     #[arg(long)]
     pub causal: bool,
-    /// Iterations a level
+    /// Iterations per level
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     pub iterations: usize,
-    /// Similar pixels kept for each pixel, for k-coherence [default: 12 for best, 15 for chen-wang, else 4]
+    /// Number of similar pixels stored for each pixel, for k-coherence [default: 12 for best, 15 for chen-wang, otherwise 4]
     #[arg(long, value_name = "K", value_parser = count)]
     pub similar: Option<usize>,
-    /// What the picture's values are
+    /// Meaning of the image's values
     #[arg(long, value_enum, default_value_t = Kind::Auto)]
     pub kind: Kind,
-    /// The solid does not repeat: opposite faces have nothing to do with each other
+    /// Make a solid that does not repeat: opposite faces are independent
     #[arg(long)]
     pub open: bool,
-    /// Voxels that are kept exactly: rows of x, y, z (numbers of voxels from 0) and the value, or r, g, b (0 to 255)
+    /// Voxels with fixed values: rows of x, y, z (voxel indices from 0) and the value, or r, g, b (0 to 255)
     #[arg(long, value_name = "CSV")]
     pub fixed: Option<PathBuf>,
-    /// Closed mesh (fitted into the box), SHAPE, or .npy (z, y, x; not 0 is inside): nothing is written outside
+    /// Closed mesh (fitted into the box), SHAPE, or .npy (z, y, x; not 0 inside); voxels outside stay 0
     #[arg(long, value_name = "MESH|NPY")]
     pub mask: Option<PathBuf>,
-    /// Also the pixel each voxel shows, u32, row x width + column, further pictures after the first; 4294967295 outside the mask
+    /// Also write the pixel from which each voxel was copied, u32, row x width + column, counted through all images; 4294967295 outside the mask
     #[arg(long, value_name = "FILE")]
     pub sources: Option<PathBuf>,
     /// File for the solid: .npy, .nrrd, .vti, .tif, .h5 or .zarr
@@ -91,16 +94,16 @@ pub struct Exemplar {
     pub output: PathBuf,
 }
 
-/// How the solid is made.
+/// Synthesis method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Method {
-    /// All at once, every voxel a pixel, all of the picture used alike
+    /// All voxels at once, each a copy of a pixel, with all pixels used evenly
     Best,
-    /// Mean of the best matches: loses contrast
+    /// Mean of the best matches, which loses contrast
     WeiLevoy,
-    /// Weighted mean, colour histogram
+    /// Weighted mean with colour histogram matching
     Kopf,
-    /// A pixel, by position and index histograms
+    /// A copied pixel, with position and index histogram matching
     ChenWang,
 }
 
@@ -109,42 +112,42 @@ pub enum Method {
 pub enum Scan {
     /// x fastest, then y, then z
     Lexicographic,
-    /// Any order
+    /// Random order
     Random,
-    /// Z-curve
+    /// Morton order (Z-curve)
     Morton,
-    /// Hilbert's curve, from neighbour to neighbour
+    /// Hilbert curve, from neighbour to neighbour
     Hilbert,
 }
 
-/// In which order voxels learn of each other.
+/// How voxels are updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Solver {
-    /// Voxel by voxel, each seen by the next
+    /// One after the other; each voxel uses the new values of those before
     Sequential,
-    /// First all are compared, then all are written
+    /// All voxels are compared before any is written
     Batch,
 }
 
-/// How neighbourhoods are found.
+/// How similar neighbourhoods are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Search {
-    /// All are compared: slow
+    /// Exhaustive search: slow
     Exact,
     /// Tree-structured vector quantisation
     Tsvq,
-    /// What continues the neighbours' matches, and its like
+    /// Candidates that continue the matches of the neighbours, and pixels similar to these
     KCoherence,
 }
 
-/// What a picture's values are.
+/// Meaning of an image's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
-    /// Phases if there are exactly two greys, else a picture
+    /// Phases if there are exactly two grey levels, otherwise an image
     Auto,
     /// Greys or colours
     Picture,
-    /// Each grey a phase of its own, up to 16
+    /// Each grey level is a phase, up to 16
     Phases,
 }
 
@@ -152,14 +155,52 @@ fn views(text: &str) -> Result<exemplar::Views, String> {
     match text.trim() {
         "2" => Ok(exemplar::Views::Two),
         "3" => Ok(exemplar::Views::Three),
-        _ => Err("2 or 3".to_owned()),
+        _ => Err("the number of views is 2 or 3".to_owned()),
     }
 }
 
-/// The pictures, checked, and what they are made of.
+/// The images, checked, and whether they are phase maps.
 struct Pictures {
     exemplars: Vec<Picture>,
     phases: bool,
+}
+
+/// JSON of `stereology exemplar`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExemplarFields {
+    /// Voxels along z, y and x, and channels.
+    shape: [usize; 4],
+    /// Synthesis method.
+    method: String,
+    /// How voxels were updated: batch or sequential.
+    solver: &'static str,
+    /// Number of families of slices that look like the images.
+    views: usize,
+    /// Whether the images were taken as phase maps.
+    phases: bool,
+    /// Resolution levels, the coarsest first.
+    levels: Vec<Level>,
+    /// Number of voxel updates, all iterations and levels together.
+    voxel_iterations: u64,
+    /// Time per voxel update in microseconds.
+    microseconds_per_voxel_iteration: f64,
+    /// Fraction of the pixels that were copied at least once.
+    coverage: f64,
+    /// Evenness of the copying: exponential of the entropy, over the number of pixels.
+    perplexity: f64,
+}
+
+/// A resolution level of the synthesis.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Level {
+    /// Voxels along z, y and x.
+    size: [usize; 3],
+    /// Energy after each iteration.
+    energies: Vec<f64>,
+}
+
+impl Fields for ExemplarFields {
+    const COMMAND: &'static str = "exemplar";
 }
 
 impl Exemplar {
@@ -173,18 +214,18 @@ impl Exemplar {
         let size = match self.size.0[..] {
             [n] => [n; 3],
             [nz, ny, nx] => [nz, ny, nx],
-            _ => return Err(Failure::usage("--size is N or NZ,NY,NX")),
+            _ => return Err(Failure::usage("--size must be N or NZ,NY,NX")),
         };
         let begin = Instant::now();
         let pictures = self.pictures()?;
         let options = self.options(everywhere.seed);
-        let mut answer = Answer::new("exemplar");
+        let mut notes = Notes::default();
         let mut domain = Domain::new(size).or_usage("--size")?;
         if self.open {
             domain = domain.open();
         }
         if let Some(path) = &self.mask {
-            let mask = given::mask(path, size, &mut answer)?;
+            let mask = given::mask(path, size, &mut notes)?;
             domain = domain.with_mask(mask.view()).at(path)?;
         }
         if let Some(path) = &self.fixed {
@@ -210,47 +251,52 @@ impl Exemplar {
                 solid.sources[[z, y, x]]
             })?;
         }
-        self.tell(&mut answer, &solid, &pictures, &options, begin.elapsed().as_secs_f64());
-        Ok(answer)
+        let fields = self.fields(&mut notes, &solid, &pictures, &options, begin.elapsed().as_secs_f64());
+        Answer::new(&fields, notes)
     }
 
-    fn tell(&self, answer: &mut Answer, solid: &Solid, pictures: &Pictures, options: &SolidOptions, seconds: f64) {
+    fn fields(
+        &self,
+        notes: &mut Notes,
+        solid: &Solid,
+        pictures: &Pictures,
+        options: &SolidOptions,
+        seconds: f64,
+    ) -> ExemplarFields {
         let (nz, ny, nx, channels) = solid.values.dim();
         let each = 1e6 * seconds / solid.voxel_iterations as f64;
         let last = solid.levels.last().and_then(|level| level.energies.last());
-        let levels: Vec<_> = solid
-            .levels
-            .iter()
-            .map(|level| json!({ "size": level.size, "energies": level.energies }))
-            .collect();
-        answer
+        let levels = solid.levels.iter().map(|level| Level {
+            size: level.size,
+            energies: level.energies.clone(),
+        });
+        notes
             .line(format!("{nx} x {ny} x {nz} voxels: {}", self.output.display()))
             .line(format!(
-                "{} levels, energy {} at the end; {} % of the pictures' pixels used, as evenly as {} % would be",
-                levels.len(),
+                "{} levels, final energy {}; {} % of the pixels of the images used, perplexity {} %",
+                solid.levels.len(),
                 last.map_or_else(String::new, |energy| significant(*energy)),
                 significant(100.0 * solid.coverage),
                 significant(100.0 * solid.perplexity)
             ))
-            .line(format!("{} microseconds a voxel and iteration", significant(each)))
-            .field("shape", vec![nz, ny, nx, channels])
-            .field("method", value_name(&self.method))
-            .field(
-                "solver",
-                if options.solver() == exemplar::Solver::Batch {
-                    "batch"
-                } else {
-                    "sequential"
-                },
-            )
-            .field("views", options.views.count())
-            .field("phases", pictures.phases)
-            .field("levels", levels)
-            .field("voxel_iterations", solid.voxel_iterations)
-            .field("microseconds_per_voxel_iteration", each)
-            .field("coverage", solid.coverage)
-            .field("perplexity", solid.perplexity)
+            .line(format!("{} microseconds per voxel and iteration", significant(each)))
             .seconds(seconds);
+        ExemplarFields {
+            shape: [nz, ny, nx, channels],
+            method: value_name(&self.method),
+            solver: if options.solver() == exemplar::Solver::Batch {
+                "batch"
+            } else {
+                "sequential"
+            },
+            views: options.views.count(),
+            phases: pictures.phases,
+            levels: levels.collect(),
+            voxel_iterations: solid.voxel_iterations,
+            microseconds_per_voxel_iteration: each,
+            coverage: solid.coverage,
+            perplexity: solid.perplexity,
+        }
     }
 
     fn options(&self, seed: u64) -> SolidOptions {
@@ -310,7 +356,7 @@ impl Exemplar {
             Kind::Phases if grey => true,
             Kind::Phases => {
                 return Err(Failure::run(format!(
-                    "{}: a map of phases is a grey picture, each grey a phase; this one has colours",
+                    "{}: a phase map is a grey image with one grey level per phase, but this image has colours",
                     self.images[0].display()
                 )));
             }
@@ -332,7 +378,7 @@ impl Exemplar {
         })
     }
 
-    /// An error of the synthesis: of an option, of the file of given voxels, or of the pictures.
+    /// Explains an error of the synthesis: names the option or the file that caused it.
     fn explained(&self, error: &SolidError) -> Failure {
         use SolidError as E;
         match error {

@@ -1,4 +1,4 @@
-//! `stereology explore`: many reliefs on one mesh, to choose from.
+//! `stereology explore`: a gallery of random reliefs on one mesh.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -8,26 +8,29 @@ use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::microgeometry::{
     Design, EdgeCensus, Exploration, Metric, Offset, ReconstructOptions, displace, reconstruct, refined,
     to_distribution_units,
 };
 use stereology::render::{Camera, RenderOptions, render_mesh};
 use stereology::shape::{Subdivision, TriangleMesh, read_mesh};
+use stereology_report::{Candidate, Displacement, Gallery, Histogram};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::contact::read_contact;
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Step, go_on};
 use crate::values::{count, positive};
 
-/// Draws many random reliefs of one mesh and shows them in a gallery: a web page that opens from disk
+/// Generates many random reliefs on one mesh and shows them in a gallery
 ///
-/// Contact distribution, units, directions, scales and profiles are drawn at random within ranges; whatever is given is the same in all. DIR/index.html shows a picture of each with its parameters, to filter and sort; DIR/designs has a design.json of
-/// each for `stereology displace MESH --design`. --near searches around a chosen one.
+/// The contact distribution, the units, and the directions, scales and functions of the displacements are drawn at random within ranges; options fix them.
+/// DIR/index.html is a web page that shows an image of each candidate with its parameters and can filter and sort them. DIR/designs holds a design of each for
+/// `stereology displace MESH --design`. --near searches in the neighbourhood of one design.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology explore bust.obj --count 500 -o gallery\n          stereology explore bust.obj --count 48 --near gallery/designs/0042.json --spread 0.2 -o closer\n          stereology explore bust.obj --count 100 --contact gravel.json --units 30,60 -o gravels"
@@ -36,43 +39,43 @@ pub struct Explore {
     /// Mesh to displace
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// How many candidates
+    /// Number of candidates
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count)]
     pub count: usize,
-    /// The same contact distribution in all
+    /// Contact distribution of all candidates
     #[arg(long, value_name = "FILE")]
     pub contact: Option<PathBuf>,
-    /// Range of the scale units
+    /// Range of the units: half the longest side of the bounding box, in units of the distribution
     #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
     pub units: Option<[f64; 2]>,
-    /// Range of typical distances, in bins
+    /// Range of the typical distances to the interface, in bins
     #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
     pub lengths: Option<[f64; 2]>,
-    /// Range of the positive region's share
+    /// Range of the fraction of the positive region
     #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
     pub shares: Option<[f64; 2]>,
-    /// Range of k (for sqrt; a third of it for x)
+    /// Range of the scale k for the function sqrt; a third of it is used for x
     #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
     pub scales: Option<[f64; 2]>,
-    /// The same displacement of the negative region in all
+    /// Displacement of the negative region in all candidates
     #[arg(long, value_name = "S,K,F", allow_hyphen_values = true)]
     pub negative: Option<Offset>,
-    /// The same displacement of the positive region in all
+    /// Displacement of the positive region in all candidates
     #[arg(long, value_name = "S,K,F", allow_hyphen_values = true)]
     pub positive: Option<Offset>,
-    /// Search near this design
+    /// Search in the neighbourhood of this design
     #[arg(long, value_name = "JSON")]
     pub near: Option<PathBuf>,
-    /// How near: parameters are multiplied by up to exp(SPREAD)
+    /// Size of the neighbourhood: parameters are multiplied by up to exp(SPREAD)
     #[arg(long, value_name = "SPREAD", default_value_t = 0.25, value_parser = positive, requires = "near")]
     pub spread: f64,
-    /// Split triangles until no edge is longer, in mesh units
+    /// Subdivide triangles until no edge is longer than this, in units of the mesh
     #[arg(long, value_name = "E", value_parser = positive)]
     pub edge_length: Option<f64>,
-    /// Side of a picture in pixels
+    /// Side of an image in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 240, value_parser = clap::value_parser!(u32).range(32..=1024))]
     pub pixels: u32,
-    /// Camera: degrees around, degrees up
+    /// Direction of the camera: azimuth and elevation in degrees
     #[arg(long, value_name = "AZIMUTH,ELEVATION", default_value = "30,20", value_parser = crate::values::pair, allow_hyphen_values = true)]
     pub view: [f32; 2],
     /// Folder for the gallery
@@ -86,6 +89,48 @@ fn range(text: &str) -> Result<[f64; 2], String> {
         [low, high] if low <= high => Ok([low, high]),
         _ => Err("a range is needed, the lower end first, such as 30,60".to_owned()),
     }
+}
+
+/// JSON of `stereology explore`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExploreFields {
+    /// Number of candidates.
+    candidates: usize,
+    /// Triangles of the mesh, after subdivision.
+    triangles: usize,
+    /// Edges with one triangle.
+    border_edges: usize,
+    /// Mean Wasserstein-1 distance of the labels from the distribution, in bins.
+    mean_emd_labels: f64,
+    /// The same for distances measured on the meshes.
+    mean_emd_measured: f64,
+    /// Ranges from which the parameters were drawn.
+    ranges: Ranges,
+}
+
+impl Fields for ExploreFields {
+    const COMMAND: &'static str = "explore";
+}
+
+/// Ranges from which the parameters of the candidates are drawn.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Ranges {
+    /// Half the longest side of the bounding box, in units of the distribution.
+    units: [f64; 2],
+    /// Typical distances to the interface, in bins.
+    lengths: [f64; 2],
+    /// Fraction of the positive region.
+    shares: [f64; 2],
+    /// Scale of the displacement.
+    scales: [f64; 2],
+    /// Whether the contact distribution was given or drawn.
+    contact: &'static str,
+    /// Displacement of the negative region, if it was given.
+    negative: Option<String>,
+    /// Displacement of the positive region, if it was given.
+    positive: Option<String>,
+    /// Size of the neighbourhood of a design, if one was given.
+    spread: Option<f64>,
 }
 
 impl Explore {
@@ -113,7 +158,7 @@ impl Explore {
         }
         let step = Step::begin("candidates", everywhere.quiet);
         let done = AtomicUsize::new(0);
-        let candidates: Vec<Value> = (1..=self.count)
+        let candidates: Vec<Candidate> = (1..=self.count)
             .into_par_iter()
             .map(|number| {
                 let mut design = match &near {
@@ -137,30 +182,32 @@ impl Explore {
             .mesh
             .file_name()
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        let table = json!({
-            "mesh": name,
-            "triangles": mesh.triangles.len(),
-            "seed": everywhere.seed,
-            "command": everywhere.invocation.command,
-            "ranges": ranges(&exploration, near.is_some().then_some(self.spread)),
-            "candidates": candidates,
-        });
-        write_text(&folder.file("index.html"), &page(&table))?;
-        let mut answer = Answer::new("explore");
-        let mean = |key: &str| {
-            candidates.iter().filter_map(|row| row[key].as_f64()).sum::<f64>() / candidates.len().max(1) as f64
+        let ranges = ranges(&exploration, near.is_some().then_some(self.spread));
+        let mean = |of: fn(&Candidate) -> Option<f64>| {
+            candidates.iter().filter_map(of).sum::<f64>() / candidates.len().max(1) as f64
         };
-        answer
-            .field("candidates", candidates.len())
-            .field("triangles", mesh.triangles.len())
-            .field("border_edges", EdgeCensus::of(&mesh).border)
-            .field("mean_emd_labels", mean("emd_labels"))
-            .field("mean_emd_measured", mean("emd_measured"))
-            .field("ranges", table["ranges"].clone());
+        let fields = ExploreFields {
+            candidates: candidates.len(),
+            triangles: mesh.triangles.len(),
+            border_edges: EdgeCensus::of(&mesh).border,
+            mean_emd_labels: mean(|of| Some(of.emd_labels)),
+            mean_emd_measured: mean(|of| of.emd_measured),
+            ranges: ranges.clone(),
+        };
+        let gallery = Gallery {
+            mesh: name,
+            triangles: mesh.triangles.len(),
+            seed: everywhere.seed,
+            command: everywhere.invocation.command.clone(),
+            ranges,
+            candidates,
+        };
+        write_text(&folder.file("index.html"), &gallery.page().or_fail()?)?;
+        let mut answer = Answer::new(&fields, Notes::default())?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
         let place = folder.publish()?;
-        answer.seconds(began.elapsed().as_secs_f64()).line(format!(
+        answer.notes.seconds(began.elapsed().as_secs_f64()).line(format!(
             "{} candidates: open {}",
             self.count,
             place.join("index.html").display()
@@ -181,14 +228,14 @@ impl Explore {
         })
     }
 
-    /// Makes one candidate: its design, its picture, and its row of the table.
+    /// Generates one candidate: its design, its image and its row of the table.
     fn candidate(
         &self,
         mesh: &TriangleMesh,
         design: &Design,
         number: usize,
         folder: &OutputFolder,
-    ) -> Result<Value, Failure> {
+    ) -> Result<Candidate, Failure> {
         let scaled = to_distribution_units(mesh, design.units).at(&self.mesh)?;
         let mut options = ReconstructOptions::default()
             .with_method(design.method)
@@ -223,41 +270,46 @@ impl Explore {
         let name = format!("{number:04}");
         write_png(&folder.file(&format!("pictures/{name}.png")), &picture)?;
         write_text(&folder.file(&format!("designs/{name}.json")), &design.to_json())?;
-        let offset = |of: &Offset| json!({"direction": of.direction.name(), "scale": of.scale, "profile": of.profile.to_string()});
+        let displacement = |of: &Offset| Displacement {
+            direction: of.direction.name(),
+            scale: of.scale,
+            profile: of.profile.to_string(),
+        };
         let digits = |x: f64| (x * 1e4).round() / 1e4;
-        Ok(json!({
-            "name": name,
-            "units": digits(design.units),
-            "positive_share": digits(design.contact.positive_share()),
-            "mean_distance": digits(mean_distance(design)),
-            "negative": offset(&design.negative),
-            "positive": offset(&design.positive),
-            "roughness": digits(roughness),
-            "emd_labels": digits(made.emd_labels),
-            "emd_measured": made.emd_measured.map(digits),
-            "misplaced": digits(made.misplaced),
-            "histogram": {
-                "negative": design.contact.negative().iter().map(|&share| digits(share)).collect::<Vec<_>>(),
-                "positive": design.contact.positive().iter().map(|&share| digits(share)).collect::<Vec<_>>(),
+        let rounded = |fractions: &[f64]| fractions.iter().map(|&fraction| digits(fraction)).collect();
+        Ok(Candidate {
+            name,
+            units: digits(design.units),
+            positive_share: digits(design.contact.positive_share()),
+            mean_distance: digits(mean_distance(design)),
+            negative: displacement(&design.negative),
+            positive: displacement(&design.positive),
+            roughness: digits(roughness),
+            emd_labels: digits(made.emd_labels),
+            emd_measured: made.emd_measured.map(digits),
+            misplaced: digits(made.misplaced),
+            histogram: Histogram {
+                negative: rounded(design.contact.negative()),
+                positive: rounded(design.contact.positive()),
             },
-        }))
+        })
     }
 }
 
-fn ranges(of: &Exploration, spread: Option<f64>) -> Value {
-    json!({
-        "units": of.units,
-        "lengths": of.lengths,
-        "shares": of.shares,
-        "scales": of.scales,
-        "contact": if of.contact.is_some() { "given" } else { "drawn" },
-        "negative": of.negative.as_ref().map(ToString::to_string),
-        "positive": of.positive.as_ref().map(ToString::to_string),
-        "spread": spread,
-    })
+fn ranges(of: &Exploration, spread: Option<f64>) -> Ranges {
+    Ranges {
+        units: of.units,
+        lengths: of.lengths,
+        shares: of.shares,
+        scales: of.scales,
+        contact: if of.contact.is_some() { "given" } else { "drawn" },
+        negative: of.negative.as_ref().map(ToString::to_string),
+        positive: of.positive.as_ref().map(ToString::to_string),
+        spread,
+    }
 }
 
-/// Mean distance to the interface, distribution units.
+/// Mean distance to the interface, in units of the distribution.
 fn mean_distance(design: &Design) -> f64 {
     let of = |shares: &[f64]| -> f64 {
         shares
@@ -272,11 +324,4 @@ fn mean_distance(design: &Design) -> f64 {
 fn to_half_side(mesh: &TriangleMesh) -> f64 {
     let side = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).max());
     if side > 0.0 { 0.5 * side } else { 1.0 }
-}
-
-/// The gallery: one page that needs nothing but the pictures beside it.
-fn page(table: &Value) -> String {
-    // `</script>` inside the data would end it.
-    let data = table.to_string().replace("</", "<\\/");
-    include_str!("../gallery.html").replace("/*DATA*/null", &data)
 }

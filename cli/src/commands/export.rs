@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::grid::Format;
 use stereology::volume::{self, VoxelGrid};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::slice::open_solid;
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_volume;
 use crate::progress::Step;
@@ -16,15 +18,14 @@ use crate::values::count;
 
 /// Writes one period of a finished solid as voxels
 ///
-/// DIR is an output folder of `stereology synthesize`. N voxels along the box's longest side, of: rgb (colours, u8), id (particle number, u32, 0 = binder),
-/// category (number of the colour category, u8,
-/// 0 = binder), distance (signed distance to the nearest particle surface, f32, negative inside). All formats hold the same values of the same voxels; axes
-/// are (z, y, x, channel).
+/// DIR is an output folder of `stereology synthesize`. The grid has N voxels along the box's longest side. Each voxel holds one channel: rgb (colour, u8), id
+/// (particle number, u32, 0 = binder), category (number of the colour category, u8, 0 = binder), distance (signed distance to the nearest particle surface,
+/// f32, negative inside) or alpha (mask, u8, 0 in voids). All formats store the same values; the axes are (z, y, x, channel).
 ///
-/// .h5 is a DREAM.3D file (ids as FeatureIds), .zarr a folder of OME-Zarr 0.5 with axes (c, z, y, x), several resolutions in shards of 32 planes.
+/// .h5 is a DREAM.3D file (ids as FeatureIds). .zarr is an OME-Zarr 0.5 folder with axes (c, z, y, x), several resolutions and shards of 32 planes.
 ///
-/// The file is written plane by plane, whatever its size. With --resume it goes on from FILE.partial if there is one, and FILE.partial stays if it is stopped:
-/// give the same command until it is done.
+/// The file is written plane by plane, so memory does not limit its size. With --resume an interrupted write keeps FILE.partial, and the same command
+/// continues from it.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology export out --voxels 256 --channel rgb -o solid.nrrd")]
 pub struct Export {
@@ -34,13 +35,13 @@ pub struct Export {
     /// Voxels along the box's longest side
     #[arg(long, value_name = "N", value_parser = count)]
     pub voxels: usize,
-    /// Points along each axis of a voxel whose mean is its colour: 1 for the colour of its centre, 4 for smooth borders
+    /// Samples per voxel along each axis, averaged into its colour: 1 takes the colour of the centre, 4 gives smooth borders
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = samples)]
     pub samples: usize,
-    /// What to write
+    /// Channel to write
     #[arg(long, value_enum, default_value_t = Channel::Rgb)]
     pub channel: Channel,
-    /// Go on from FILE.partial, and keep it when stopped
+    /// Continue from FILE.partial, and keep it when interrupted
     #[arg(long)]
     pub resume: bool,
     /// File: .npy, .nrrd, .vti, .tif, .h5 or .zarr
@@ -48,7 +49,7 @@ pub struct Export {
     pub output: PathBuf,
 }
 
-/// What a voxel holds.
+/// Content of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Channel {
     /// Colour, u8
@@ -67,7 +68,22 @@ fn samples(text: &str) -> Result<usize, String> {
     text.parse()
         .ok()
         .filter(|n| (1..=16).contains(n))
-        .ok_or_else(|| "a number of points from 1 to 16 is needed".to_owned())
+        .ok_or_else(|| "a whole number of samples from 1 to 16 is needed".to_owned())
+}
+
+/// JSON of `stereology export`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExportFields {
+    /// Voxels along z, y and x.
+    shape: [usize; 3],
+    /// Side of a voxel along x, y and z, in units of length.
+    spacing: [f64; 3],
+    /// Content of the voxels: rgb, id, category, distance or alpha.
+    channel: &'static str,
+}
+
+impl Fields for ExportFields {
+    const COMMAND: &'static str = "export";
 }
 
 impl Export {
@@ -96,15 +112,16 @@ impl Export {
         .at(&self.output)?;
         drop(step);
         let [nx, ny, nz] = grid.counts;
-        let mut answer = Answer::new("export");
-        answer
-            .field("shape", vec![nz, ny, nx])
-            .field("spacing", grid.spacing.to_vec())
-            .field("channel", name)
-            .line(format!(
-                "{nx} x {ny} x {nz} voxels ({name}) written to {}",
-                self.output.display()
-            ));
-        Ok(answer)
+        let mut notes = Notes::default();
+        notes.line(format!(
+            "{nx} x {ny} x {nz} voxels ({name}) written to {}",
+            self.output.display()
+        ));
+        let fields = ExportFields {
+            shape: [nz, ny, nx],
+            spacing: grid.spacing,
+            channel: name,
+        };
+        Answer::new(&fields, notes)
     }
 }

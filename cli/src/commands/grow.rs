@@ -1,4 +1,4 @@
-//! `stereology grow`: stone grown around measurements inside a mesh.
+//! `stereology grow`: stone synthesised inside a mesh around measurements.
 
 mod measurements;
 
@@ -8,33 +8,36 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndarray::{Array3, Array4, ArrayView3, Axis};
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::exemplar::SolidError;
 use stereology::files::voxel_table::ValueRange;
 use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
 use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels};
-use stereology::metrics::{Seams, seams};
+use stereology::metrics::seams;
 use stereology::pipeline::finish_grown;
 use stereology::segment::read_photo;
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
 
 use self::measurements::Unit;
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body};
-use crate::numbers::{counted, significant};
 use crate::outputs::{check_file, write_png};
 use crate::progress::{Step, go_on, stopped};
 use crate::values::count;
 use crate::warnings::Warning;
+use stereology_report::{counted, significant};
 
-/// Fills a mesh with stone that looks like a picture and agrees with measurements
+/// Fills a mesh with stone that looks like an image and agrees with measurements
 ///
-/// Voxels whose centres lie inside MESH are filled outwards from seeds, the nearest first: each looks at the window about it in a random plane and copies the middle of a window of IMAGE that looks like what is
-/// there already (Stone et al. 2014). Measured voxels keep their values; connected ones are one seed. The rest of the box is 0.
+/// Voxels whose centres lie inside MESH are filled outwards from seeds, the nearest first. For each voxel, the values around it in a random plane are compared
+/// with the windows of IMAGE, and the centre of a similar window is copied (Stone et al. 2014). Measured voxels keep their values; a connected component of
+/// measured voxels is one seed. The rest of the box is 0.
 ///
-/// MESH is a closed mesh (.obj, .stl, .ply), sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L or rock:SEED; or picture:H,W, which grows a picture (-o FILE.png) by Efros and Leung's method. IMAGE is a picture, or a .npy, .nrrd or
-/// .tif of any number of channels (grey and chemistry); the result has its channels and, if it holds bytes, is u8, else f32.
+/// MESH is a closed mesh (.obj, .stl, .ply), sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L or rock:SEED; or picture:H,W, which synthesises an image
+/// (-o FILE.png) by Efros and Leung's method. IMAGE is an image, or a .npy, .nrrd or .tif with any number of channels (grey and chemistry). The result has the
+/// same channels; it is u8 if IMAGE holds bytes, otherwise f32.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology grow statue.obj soapstone.png --resolution 96 --measured drilled.csv -o statue.npy"
@@ -42,71 +45,71 @@ use crate::warnings::Warning;
 pub struct Grow {
     /// Closed mesh, SHAPE, or picture:H,W
     pub mesh: String,
-    /// What the stone looks like in a cut
+    /// Image of a section through the stone
     pub image: PathBuf,
     /// Voxels along the mesh's longest side
     #[arg(long, value_name = "N", value_parser = count)]
     pub resolution: Option<usize>,
-    /// Measurements: rows of x, y, z and a value for each channel of IMAGE, as stored there (0 to 255 of a picture)
+    /// Measurements: rows of x, y, z and one value per channel of IMAGE, in its units (0 to 255 for an image)
     #[arg(long, value_name = "CSV")]
     pub measured: Option<PathBuf>,
-    /// What x, y, z of the measurements are
+    /// Unit of the coordinates x, y, z of the measurements
     #[arg(long, value_enum, default_value_t = Unit::Auto)]
     pub measured_in: Unit,
-    /// Random seeds besides the measurements [default: 12 without measurements, else none]
+    /// Number of random seeds besides the measurements [default: 12 without measurements, otherwise none]
     #[arg(long, value_name = "K", value_parser = seeds)]
     pub seeds: Option<usize>,
-    /// Side of the window, pixels: odd, 3 to 15; 0 takes colours of the histogram, without texture
+    /// Side of the window in pixels, odd, 3 to 15; 0 draws colours from the histogram, without texture
     #[arg(long, value_name = "PIXELS", default_value_t = 5)]
     pub window: usize,
-    /// Planes in which windows lie
+    /// Planes of the windows
     #[arg(long, value_enum, default_value_t = Planes::Axis)]
     pub planes: Planes,
-    /// How windows are looked for
+    /// How similar windows are found
     #[arg(long, value_enum, default_value_t = Way::Tree)]
     pub search: Way,
-    /// Iterations of a finishing pass that removes the seams between cells, as `exemplar --method best` does; measured voxels stay. 0 is none; 10 are plenty
+    /// Iterations of a finishing pass that removes the seams between cells, as `exemplar --method best` does; measured voxels are kept. 0 skips it; 10 suffice
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = finish)]
     pub finish: usize,
-    /// For picture:H,W: that many levels from coarse to fine, row by row (Wei and Levoy), instead of growing
+    /// For picture:H,W: synthesise row by row on this many levels, from coarse to fine (Wei and Levoy), instead of growing
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
-    /// Also the cell of each voxel, u32 from 1; 0 is outside the mesh
+    /// Also write the cell of each voxel, u32 from 1; 0 is outside the mesh
     #[arg(long, value_name = "FILE")]
     pub cells: Option<PathBuf>,
-    /// Also the texel of IMAGE each voxel was copied from, u32, row x width + column; 4294967295 where it was not copied
+    /// Also write the texel of IMAGE from which each voxel was copied, u32, row x width + column; 4294967295 where nothing was copied
     #[arg(long, value_name = "FILE")]
     pub sources: Option<PathBuf>,
-    /// File for the stone: .npy, .nrrd, .vti, .tif (.png of a picture)
+    /// File for the stone: .npy, .nrrd, .vti, .tif; .png for picture:H,W
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 }
 
-/// Planes in which windows lie.
+/// Planes of the windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Planes {
-    /// The three planes of the axes
+    /// The three coordinate planes
     Axis,
-    /// Those and ten diagonal ones
+    /// The coordinate planes and ten diagonal planes
     Oblique,
 }
 
-/// How windows are looked for.
+/// How similar windows are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Way {
-    /// Some 400 windows by a tree, and those that continue the neighbours' own
+    /// About 400 windows from a tree, and those that continue the windows of the neighbours
     Tree,
     /// Every window of IMAGE
     Exact,
 }
 
-/// What the stone looks like, values as stored.
+/// Image of the stone, values as stored.
 struct Image {
     samples: Array3<f32>,
     is_bytes: bool,
 }
 
-/// 0 to a million.
+/// A number of seeds, 0 to a million.
 fn seeds(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(number @ 0..=1_000_000) => Ok(number),
@@ -114,12 +117,62 @@ fn seeds(text: &str) -> Result<usize, String> {
     }
 }
 
-/// 0 to a thousand.
+/// A number of iterations, 0 to a thousand.
 fn finish(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(number @ 0..=1000) => Ok(number),
         _ => Err("a whole number from 0 to 1000 is needed".to_owned()),
     }
+}
+
+/// JSON of `stereology grow`.
+#[derive(Debug, Default, Serialize, JsonSchema)]
+pub struct GrowFields {
+    /// Visibility of the seams between cells: contrast across them over contrast inside cells; null without seams. For solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seams: Option<Option<f64>>,
+    /// Iterations of the finishing pass; with --finish.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    finish: Option<usize>,
+    /// Visibility of the seams before the finishing pass; with --finish.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seams_before_finish: Option<Option<f64>>,
+    /// Voxels inside the mesh, or pixels of the image.
+    voxels_inside: usize,
+    /// Voxels that were filled.
+    filled: usize,
+    /// Measured voxels whose value changed; always 0.
+    fixed_changed: usize,
+    /// Number of cells.
+    cells: usize,
+    /// Measured voxels; for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<usize>,
+    /// Connected components of the mesh that had no seed and got one; for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    added_seeds: Option<usize>,
+    /// Voxels whose value was drawn from the histogram; for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    by_histogram: Option<usize>,
+    /// Mean distance of a window from the window it was matched with; for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_distance: Option<f64>,
+    /// Side of the window in pixels.
+    window: usize,
+    /// Samples along each axis, and channels.
+    shape: Vec<usize>,
+    /// Side of a voxel in units of the mesh; for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spacing: Option<f64>,
+    /// Corner of the box in units of the mesh (x, y, z); for solids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<[f64; 3]>,
+    /// Time per voxel in microseconds.
+    microseconds_per_voxel: f64,
+}
+
+impl Fields for GrowFields {
+    const COMMAND: &'static str = "grow";
 }
 
 impl Grow {
@@ -136,18 +189,18 @@ impl Grow {
                 check_file(path, everywhere.force)?;
             }
         }
-        let resolution = self
-            .resolution
-            .ok_or_else(|| Failure::usage("--resolution N is needed: voxels along the mesh's longest side"))?;
+        let resolution = self.resolution.ok_or_else(|| {
+            Failure::usage("--resolution N is missing: the number of voxels along the mesh's longest side")
+        })?;
         if self.levels.is_some() {
-            return Err(Failure::usage("--levels is for picture:H,W"));
+            return Err(Failure::usage("--levels applies only to picture:H,W"));
         }
         let begin = Instant::now();
-        let mut answer = Answer::new("grow");
+        let mut notes = Notes::default();
         let image = self.image()?;
         let mesh = closed_mesh(&self.mesh)?;
         for repair in mesh.repairs() {
-            answer.warn(Warning::new("mesh-repaired", repair.to_string()));
+            notes.warn(Warning::new("mesh-repaired", repair.to_string()));
         }
         let voxels = Voxels::of_mesh(&mesh, resolution).at(Path::new(&self.mesh))?;
         let channels = image.samples.dim().2;
@@ -161,7 +214,7 @@ impl Grow {
                 };
                 let found = measurements::read(path, self.measured_in, &voxels, channels, range)?;
                 found.warnings.into_iter().for_each(|warning| {
-                    answer.warn(warning);
+                    notes.warn(warning);
                 });
                 found.voxels
             }
@@ -195,28 +248,27 @@ impl Grow {
             }
         }
         let found = seams(grown.values.view(), grown.labels.view());
-        let told = |seams: Seams| seams.visibility().map_or(Value::Null, |v| json!(v));
-        answer.field("seams", told(found));
+        let mut fields = self.fields(&mut notes, &grown, &voxels, begin.elapsed().as_secs_f64());
+        fields.seams = Some(found.visibility());
         if self.finish > 0 {
-            answer
-                .field("finish", self.finish)
-                .field("seams_before_finish", told(seams_grown));
+            fields.finish = Some(self.finish);
+            fields.seams_before_finish = Some(seams_grown.visibility());
         }
-        self.tell(&mut answer, &grown, &voxels, begin.elapsed().as_secs_f64());
-        Ok(answer)
+        Answer::new(&fields, notes)
     }
 
-    fn tell(&self, answer: &mut Answer, grown: &Grown, voxels: &Voxels, seconds: f64) {
+    fn fields(&self, notes: &mut Notes, grown: &Grown, voxels: &Voxels, seconds: f64) -> GrowFields {
         let (nz, ny, nx, channels) = grown.values.dim();
         if grown.added_seeds > 0 {
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "seeds-added",
-                format!("{} parts of the mesh had no seed", grown.added_seeds),
+                format!("{} connected components of the voxels had no seed", grown.added_seeds),
             ));
         }
-        answer
+        let microseconds_per_voxel = 1e6 * seconds / grown.filled.max(1) as f64;
+        notes
             .line(format!(
-                "{} of {} voxels inside filled, {nx} x {ny} x {nz} of {} mesh units: {}",
+                "{} of {} voxels inside filled, {nx} x {ny} x {nz} voxels with side {} in units of the mesh: {}",
                 counted(grown.filled as u64),
                 counted(grown.inside as u64),
                 significant(voxels.spacing),
@@ -227,23 +279,26 @@ impl Grow {
                 grown.cells, grown.measured, grown.fixed_changed
             ))
             .line(format!(
-                "{} microseconds a voxel",
-                significant(1e6 * seconds / grown.filled.max(1) as f64)
+                "{} microseconds per voxel",
+                significant(microseconds_per_voxel)
             ))
-            .field("voxels_inside", grown.inside)
-            .field("filled", grown.filled)
-            .field("fixed_changed", grown.fixed_changed)
-            .field("cells", grown.cells)
-            .field("measured", grown.measured)
-            .field("added_seeds", grown.added_seeds)
-            .field("by_histogram", grown.by_histogram)
-            .field("mean_distance", grown.mean_distance)
-            .field("window", self.window)
-            .field("shape", vec![nz, ny, nx, channels])
-            .field("spacing", voxels.spacing)
-            .field("origin", vec![voxels.origin.x, voxels.origin.y, voxels.origin.z])
-            .field("microseconds_per_voxel", 1e6 * seconds / grown.filled.max(1) as f64)
             .seconds(seconds);
+        GrowFields {
+            voxels_inside: grown.inside,
+            filled: grown.filled,
+            fixed_changed: grown.fixed_changed,
+            cells: grown.cells,
+            measured: Some(grown.measured),
+            added_seeds: Some(grown.added_seeds),
+            by_histogram: Some(grown.by_histogram),
+            mean_distance: Some(grown.mean_distance),
+            window: self.window,
+            shape: vec![nz, ny, nx, channels],
+            spacing: Some(voxels.spacing),
+            origin: Some(voxels.origin.into()),
+            microseconds_per_voxel,
+            ..GrowFields::default()
+        }
     }
 
     fn options(&self, seed: u64, seeds: usize) -> GrowOptions {
@@ -261,12 +316,12 @@ impl Grow {
             .with_seed(seed)
     }
 
-    /// An error of growing: a window that cannot be is wrong usage, everything else is about a file.
+    /// Explains an error of the synthesis: names the option or the file that caused it.
     fn explained(&self, error: &grow::GrowError) -> Failure {
         use grow::GrowError as E;
         match error {
             E::Window { .. } => Failure::usage(format!("--window: {error}")),
-            E::NoSeeds => Failure::usage("nothing to grow from: give --measured CSV, or --seeds K above 0"),
+            E::NoSeeds => Failure::usage("there is no seed; give --measured CSV, or --seeds K above 0"),
             E::Levels { .. } => Failure::usage(format!("--levels: {error}")),
             E::OutsideMask { .. } | E::Contradicting { .. } | E::Value { .. } => match &self.measured {
                 Some(path) => Failure::run(format!("{}: {error}", path.display())),
@@ -306,7 +361,7 @@ impl Grow {
         ];
         if !is_png || only_solids.contains(&true) {
             return Err(Failure::usage(
-                "picture:H,W is written to -o FILE.png, and takes no --resolution, --measured, --cells, --sources or --finish",
+                "picture:H,W needs -o FILE.png, and --resolution, --measured, --cells, --sources and --finish do not apply to it",
             ));
         }
         check_file(&self.output, everywhere.force)?;
@@ -314,7 +369,7 @@ impl Grow {
         let channels = image.samples.dim().2;
         if !image.is_bytes || !(channels == 1 || channels == 3) {
             return Err(Failure::run(format!(
-                "{}: a picture is grown from a grey or RGB picture of bytes",
+                "{}: picture:H,W needs a grey or RGB image of bytes",
                 self.image.display()
             )));
         }
@@ -344,18 +399,20 @@ impl Grow {
         go_on()?;
         write_png(&self.output, &as_picture(&made.view()))?;
         let seconds = begin.elapsed().as_secs_f64();
-        let mut answer = Answer::new("grow");
-        answer
+        let mut notes = Notes::default();
+        notes
             .line(format!("{width} x {height} pixels: {}", self.output.display()))
-            .field("voxels_inside", height * width)
-            .field("filled", height * width)
-            .field("fixed_changed", 0)
-            .field("cells", 1)
-            .field("window", self.window)
-            .field("shape", vec![height, width, channels])
-            .field("microseconds_per_voxel", 1e6 * seconds / (height * width) as f64)
             .seconds(seconds);
-        Ok(answer)
+        let fields = GrowFields {
+            voxels_inside: height * width,
+            filled: height * width,
+            cells: 1,
+            window: self.window,
+            shape: vec![height, width, channels],
+            microseconds_per_voxel: 1e6 * seconds / (height * width) as f64,
+            ..GrowFields::default()
+        };
+        Answer::new(&fields, notes)
     }
 
     fn image(&self) -> Result<Image, Failure> {
@@ -363,7 +420,7 @@ impl Grow {
         let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let stored = match ending.as_deref() {
             Some("npy" | "nrrd" | "nhdr") => read_volume(path).at(path)?,
-            // A TIFF that is not of bytes or colours may hold chemistry; a photograph comes in more ways.
+            // A TIFF that holds neither bytes nor colours may hold chemistry; images use more TIFF variants than volumes.
             Some("tif" | "tiff") => match read_volume(path) {
                 Ok(stored) if stored.samples.dim().3 != 4 => stored,
                 _ => return of_photo(path),
@@ -373,7 +430,7 @@ impl Grow {
         let (slices, ..) = stored.samples.dim();
         if slices != 1 {
             return Err(Failure::run(format!(
-                "{}: holds {slices} slices; give one picture, axes (y, x) or (y, x, 3), or (1, y, x, channel)",
+                "{}: has {slices} slices; give a single image with axes (y, x), (y, x, 3) or (1, y, x, channel)",
                 path.display()
             )));
         }
@@ -384,7 +441,7 @@ impl Grow {
     }
 }
 
-/// A photograph's bytes; grey if it shows nothing else.
+/// Bytes of an image; one channel if it is grey.
 fn of_photo(path: &Path) -> Result<Image, Failure> {
     let photo = read_photo(path).at(path)?;
     let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
@@ -406,7 +463,7 @@ fn as_picture(made: &ArrayView3<'_, f32>) -> image::RgbImage {
     })
 }
 
-/// The mesh of a file or a SHAPE; balls as many triangles.
+/// The mesh of a file or a SHAPE; spheres and ellipsoids are triangulated finely.
 pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
     let path = Path::new(spec);
     let is_file = path
@@ -421,7 +478,7 @@ pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
             .map(|n| n.trim().parse().ok())
             .collect()
     };
-    // Checks the numbers, and knows every other shape.
+    // Checks the numbers, and makes every other shape.
     let body: Body = body(spec)?;
     if let Some(mesh) = body.mesh() {
         return Ok(mesh.clone());

@@ -1,63 +1,64 @@
-//! `stereology measure`: a solid judged by its slices.
+//! `stereology measure`: a solid compared with an image by its slices.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use image::{Rgb, RgbImage};
 use ndarray::{Array3, Array4, ArrayView3, Axis, Ix3};
-use serde_json::{Value, json};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Serialize, Serializer};
 use stereology::grid::{SampleType, read_npy, read_volume};
 use stereology::metrics::{Comparison, Family, FamilyError, Figure, copying, sections, sections_inside};
 use stereology::pipeline::{CompareOptions, compare_solid};
 use stereology::segment::read_photo;
 use stereology::spectrum::BandPass;
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::significant;
 use crate::outputs::{check_file, write_text};
 use crate::progress::{Step, go_on};
-use crate::report::{MeasureReport, measures_page};
 use crate::values::{count, pair, positive};
 use crate::warnings::Warning;
+use stereology_report::{MeasureReport, significant};
 
-/// Tells how like the slices of a volume are to a picture, or to the slices of another volume
+/// Measures how similar the slices of a volume are to an image, or to the slices of another volume
 ///
-/// Works on the volumes of any program: .npy, .nrrd and .tif (a page a z) of any sample type, grey or RGB. Rows of EXEMPLAR run along z and its columns along x (slices xz), or along y
-/// (slices yz); rows of xy slices run along y.
+/// Works on volumes from any program: .npy, .nrrd and .tif (one page per z) of any sample type, grey or RGB. Rows of EXEMPLAR run along z and its columns along
+/// x (slices xz) or along y (slices yz); rows of xy slices run along y.
 ///
-/// Every figure comes with its ideal (0 of a distance, 1 of a ratio, else the exemplar's own) and its floor: how far from the ideal two halves of the exemplar are from each other. A solid at the
-/// floor cannot be told from its exemplar. Fringe lengths and windings mean something only for layered textures.
+/// Every measure is reported with its ideal (0 for a distance, 1 for a ratio, otherwise the exemplar's own value) and its floor: the difference between two
+/// halves of the exemplar. A solid at the floor is as similar to its exemplar as the exemplar's halves are to each other. Fringe lengths and tortuosities are
+/// meaningful only for layered textures.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology measure exemplar.png solid.npy --slices xz,yz --report measures.html")]
 pub struct Measure {
-    /// Picture (PNG, JPEG, TIFF) or volume (.npy, .nrrd, .tif) that the slices should look like
+    /// Image (PNG, JPEG, TIFF) or volume (.npy, .nrrd, .tif) that the slices should look like
     pub exemplar: PathBuf,
-    /// Volume to be judged: .npy, .nrrd or .tif
+    /// Volume to measure: .npy, .nrrd or .tif
     pub volume: PathBuf,
-    /// Slices to look at, any of xz, yz, xy
+    /// Families of slices to measure: any of xz, yz, xy
     #[arg(long, value_name = "FAMILIES", default_value = "xz,yz,xy")]
     pub slices: Families,
-    /// Most slices of a family that are measured, evenly spread
+    /// Maximum number of slices per family, evenly spaced
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = count)]
     pub at_most: usize,
-    /// Values of the volume that mean black and white [default: 0 and 255 or 65,535 of unsigned samples, 0 and 1 of floating point between them, else the volume's least and greatest]
+    /// Values of the volume for black and white [default: 0 and 255 or 65,535 for unsigned samples; 0 and 1 for floating point within that range; otherwise the least and greatest value]
     #[arg(long, value_name = "LOW,HIGH", value_parser = pair, allow_hyphen_values = true)]
     pub range: Option<[f32; 2]>,
-    /// The same of the exemplar, if it is a volume or a float picture
+    /// The same for the exemplar, if it is a volume or a floating-point image
     #[arg(long, value_name = "LOW,HIGH", value_parser = pair, allow_hyphen_values = true)]
     pub exemplar_range: Option<[f32; 2]>,
-    /// Distance from fringe to fringe, pixels [default: the strongest period of the exemplar]
+    /// Distance between fringes in pixels [default: the strongest period of the exemplar]
     #[arg(long, value_name = "PIXELS", value_parser = positive)]
     pub period: Option<f64>,
-    /// Which texel each voxel was copied from (.npy of u32: row x width + column): tells coverage and copying too
+    /// Texel from which each voxel was copied (.npy of u32: row x width + column); adds coverage and copying to the result
     #[arg(long, value_name = "NPY")]
     pub sources: Option<PathBuf>,
-    /// Volume of the same size (.npy, .nrrd, .tif), not 0 inside, such as `grow --cells`: of each slice the largest rectangle inside is measured
+    /// Mask of the same size (.npy, .nrrd, .tif), not 0 inside, such as `grow --cells`; the largest rectangle inside is measured on each slice
     #[arg(long, value_name = "FILE")]
     pub mask: Option<PathBuf>,
-    /// A page with all curves and pictures
+    /// Also write a page with all curves and images (HTML)
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
 }
@@ -81,13 +82,152 @@ impl std::str::FromStr for Families {
     }
 }
 
-/// Pixels that a slice needs inside the mask, each way.
+/// Smallest side in pixels of a rectangle inside the mask.
 const LEAST_INSIDE: usize = 16;
 
-/// A picture or volume with values 0 to 1.
+/// An image or volume with values 0 to 1.
 struct Samples {
     values: Array4<f32>,
     guessed: Option<Warning>,
+}
+
+/// JSON of `stereology measure`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct MeasureFields {
+    /// Every measure with its ideal and its floor.
+    #[serde(flatten)]
+    figures: Figures,
+    /// Number of slices measured.
+    slices: usize,
+    /// Families of slices.
+    families: Vec<String>,
+    /// Grey level, 0 to 1, above which pixels belong to the bright phase.
+    threshold: f64,
+    /// Distance between fringes in pixels; null if the exemplar has no period.
+    period: Option<f64>,
+    /// Main direction of the exemplar in degrees; null if it has none.
+    direction: Option<f64>,
+    /// Height and width in pixels of the windows in which fringes are measured.
+    window: [usize; 2],
+    /// Fringes measured in the volume.
+    fringes: usize,
+    /// Fringes measured in the exemplar.
+    fringes_exemplar: usize,
+    /// How voxels were copied from the exemplar; with --sources.
+    #[serde(flatten)]
+    copying: Option<CopyingFields>,
+}
+
+/// How the voxels of a solid were copied from the pixels of its exemplar.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CopyingFields {
+    /// Fraction of the texels that were copied at least once.
+    coverage: f64,
+    /// Evenness of the copying: exponential of the entropy, over the number of texels.
+    perplexity: f64,
+    /// Longest run of pixels copied in one piece.
+    longest_copy: usize,
+}
+
+/// The measures by name, each as NAME, NAME_ideal and NAME_floor.
+#[derive(Debug)]
+pub struct Figures([(&'static str, Figure); MEASURES.len()]);
+
+/// Names and meanings of the measures, in the order of [`Comparison::figures`].
+const MEASURES: [(&str, &str); 15] = [
+    (
+        "kl_grey",
+        "Kullback-Leibler divergence of the histograms of grey levels, in nats",
+    ),
+    (
+        "std_ratio",
+        "Standard deviation of grey levels over that of the exemplar",
+    ),
+    ("skewness", "Skewness of grey levels"),
+    (
+        "kl_orientation",
+        "Kullback-Leibler divergence of the histograms of directions, in nats",
+    ),
+    ("coherence", "Coherence of the structure tensor, 0 to 1"),
+    (
+        "fringe_length",
+        "Mean length of the fringes that lie inside a window, in pixels",
+    ),
+    (
+        "fringe_length_by_ends",
+        "Twice the visible length of fringes over their visible ends, in pixels",
+    ),
+    (
+        "tortuosity",
+        "Mean length of a fringe over the distance between its ends",
+    ),
+    (
+        "s2",
+        "Root mean square difference of the two-point correlation of the bright phase",
+    ),
+    (
+        "lineal_path",
+        "Largest difference of the lineal-path function of the bright phase",
+    ),
+    (
+        "chord_ratio",
+        "Mean chord length of the bright phase over that of the exemplar",
+    ),
+    (
+        "local_porosity",
+        "Wasserstein-1 distance of the local fractions of the bright phase",
+    ),
+    ("swd7", "Sliced Wasserstein distance of patches of 7 x 7 pixels"),
+    ("swd16", "Sliced Wasserstein distance of patches of 16 x 16 pixels"),
+    ("gradient_ratio", "Mean gradient over that of the exemplar"),
+];
+
+impl Serialize for Figures {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let rows = self.0.iter().flat_map(|(name, Figure { value, ideal, floor })| {
+            [
+                ((*name).to_owned(), value),
+                (format!("{name}_ideal"), ideal),
+                (format!("{name}_floor"), floor),
+            ]
+        });
+        serializer.collect_map(rows)
+    }
+}
+
+impl JsonSchema for Figures {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Figures".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let (mut properties, mut required) = (serde_json::Map::new(), Vec::new());
+        for (name, meaning) in MEASURES {
+            for (key, what) in [
+                (name.to_owned(), format!("{meaning}; null if not measurable.")),
+                (format!("{name}_ideal"), format!("Ideal value of `{name}`.")),
+                (
+                    format!("{name}_floor"),
+                    format!("Distance of `{name}` from its ideal between two halves of the exemplar."),
+                ),
+            ] {
+                properties.insert(
+                    key.clone(),
+                    serde_json::json!({ "description": what, "type": ["number", "null"] }),
+                );
+                required.push(key);
+            }
+        }
+        json_schema!({ "type": "object", "properties": properties, "required": required })
+    }
+}
+
+impl Fields for MeasureFields {
+    const COMMAND: &'static str = "measure";
 }
 
 impl Measure {
@@ -95,23 +235,23 @@ impl Measure {
         if let Some(report) = &self.report {
             check_file(report, everywhere.force)?;
         }
-        let mut answer = Answer::new("measure");
+        let mut notes = Notes::default();
         let exemplar = read(&self.exemplar, self.exemplar_range, "--exemplar-range")?;
         let volume = read(&self.volume, self.range, "--range")?;
         if volume.values.dim().0 == 1 && self.slices.0 != [Family::Xy] {
             return Err(Failure::run(format!(
-                "{}: is one picture, no volume; to compare it as it is, give --slices xy",
+                "{} is an image, not a volume; to compare it as a single slice, give --slices xy",
                 self.volume.display()
             )));
         }
         for warning in [exemplar.guessed, volume.guessed].into_iter().flatten() {
-            answer.warn(warning);
+            notes.warn(warning);
         }
         let mask = self.inside(&volume.values)?;
         let (slices, left_out) = self.of(&volume.values, mask.as_ref());
         if slices.is_empty() {
             return Err(Failure::run(format!(
-                "{}: no slice has a square of {LEAST_INSIDE} pixels inside the mask",
+                "{}: no slice has a rectangle of at least {LEAST_INSIDE} x {LEAST_INSIDE} pixels inside the mask",
                 self.volume.display()
             )));
         }
@@ -121,7 +261,7 @@ impl Measure {
             self.of(&exemplar.values, None).0
         };
         if left_out > 0 {
-            answer.warn(Warning::new(
+            notes.warn(Warning::new(
                 "slices-left-out",
                 format!("{} slices were measured, {left_out} left out", slices.len()),
             ));
@@ -135,9 +275,9 @@ impl Measure {
         let found = compare_solid(&pictures, &slices, &options, &|done| step.at(done)).or_fail()?;
         drop(step);
         go_on()?;
-        tell(&mut answer, &found, slices.len(), &self.slices);
+        let mut fields = fields(&mut notes, &found, slices.len(), &self.slices);
         if let Some(path) = &self.sources {
-            self.copying(&mut answer, path, &exemplar.values, &volume.values)?;
+            fields.copying = Some(self.copying(&mut notes, path, &exemplar.values, &volume.values)?);
         }
         if let Some(path) = &self.report {
             let middle = |pictures: &[ArrayView3<'_, f32>]| pictures.get(pictures.len() / 2).map(picture);
@@ -145,7 +285,7 @@ impl Measure {
                 let of = sections(volume.values.view(), family);
                 middle(&of).map(|picture| (format!("Slice {family} of the volume"), picture))
             });
-            let page = measures_page(&MeasureReport {
+            let report = MeasureReport {
                 exemplar_name: name(&self.exemplar),
                 volume_name: name(&self.volume),
                 exemplar: middle(&pictures),
@@ -154,10 +294,10 @@ impl Measure {
                 comparison: &found,
                 command: everywhere.invocation.command.clone(),
                 parameters: everywhere.invocation.parameters.clone(),
-            });
-            write_text(path, &page)?;
+            };
+            write_text(path, &report.page().or_fail()?)?;
         }
-        Ok(answer)
+        Answer::new(&fields, notes)
     }
 
     /// Which voxels of the volume count; all if `None`.
@@ -168,7 +308,7 @@ impl Measure {
         let (nz, ny, nx, _) = volume.dim();
         if mask.dim() != (nz, ny, nx) {
             return Err(Failure::run(format!(
-                "{}: a mask of {:?} voxels for a volume of {nz} x {ny} x {nx}",
+                "{}: the mask has {:?} voxels, but the volume {nz} x {ny} x {nx}",
                 path.display(),
                 mask.dim()
             )));
@@ -176,7 +316,7 @@ impl Measure {
         Ok(Some(mask))
     }
 
-    /// The slices that are measured, and how many are left out.
+    /// The slices to measure, and the number left out.
     fn of<'a>(&self, volume: &'a Array4<f32>, mask: Option<&Array3<bool>>) -> (Vec<ArrayView3<'a, f32>>, usize) {
         let (mut taken, mut all) = (Vec::new(), 0);
         for &family in &self.slices.0 {
@@ -196,11 +336,11 @@ impl Measure {
 
     fn copying(
         &self,
-        answer: &mut Answer,
+        notes: &mut Notes,
         path: &Path,
         exemplar: &Array4<f32>,
         volume: &Array4<f32>,
-    ) -> Result<(), Failure> {
+    ) -> Result<CopyingFields, Failure> {
         let (nz, ny, nx, _) = volume.dim();
         let sources = read_npy::<u32>(path).at(path)?;
         let shape = sources.shape().to_vec();
@@ -210,7 +350,7 @@ impl Measure {
             .filter(|sources| sources.dim() == (nz, ny, nx))
             .ok_or_else(|| {
                 Failure::run(format!(
-                    "{}: has axes {shape:?}, the volume {nz} x {ny} x {nx}; give the sources of this volume",
+                    "{}: the shape {shape:?} differs from that of the volume, {nz} x {ny} x {nx}; give the sources of this volume",
                     path.display()
                 ))
             })?;
@@ -221,55 +361,43 @@ impl Measure {
             .flat_map(|family| sources.axis_iter(family.normal()))
             .collect();
         let found = copying(&pictures, exemplar.dim().1, exemplar.dim().2);
-        answer
-            .field("coverage", found.coverage)
-            .field("perplexity", found.perplexity)
-            .field("longest_copy", found.longest_copy)
-            .line(format!(
-                "sources: coverage {}, perplexity {} of the texels, longest copy {} pixels",
-                significant(found.coverage),
-                significant(found.perplexity),
-                found.longest_copy
-            ));
-        Ok(())
+        notes.line(format!(
+            "sources: coverage {}, perplexity {} of the texels, longest copy {} pixels",
+            significant(found.coverage),
+            significant(found.perplexity),
+            found.longest_copy
+        ));
+        Ok(CopyingFields {
+            coverage: found.coverage,
+            perplexity: found.perplexity,
+            longest_copy: found.longest_copy,
+        })
     }
 }
 
-fn tell(answer: &mut Answer, found: &Comparison, slices: usize, families: &Families) {
-    let number = |value: Option<f64>| value.map_or(Value::Null, |value| json!(value));
-    let said = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), significant);
-    answer.line(format!(
+fn fields(notes: &mut Notes, found: &Comparison, slices: usize, families: &Families) -> MeasureFields {
+    let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), significant);
+    notes.line(format!(
         "{:<22} {:>10} {:>10} {:>10} {:>10}",
-        "", "volume", "ideal", "floor", "floors off"
+        "", "volume", "ideal", "floor", "in floors"
     ));
     for (name, figure) in found.figures() {
         let Figure { value, ideal, floor } = figure;
-        answer
-            .field(name, number(value))
-            .field(&format!("{name}_ideal"), number(ideal))
-            .field(&format!("{name}_floor"), number(floor))
-            .line(format!(
-                "{name:<22} {:>10} {:>10} {:>10} {:>10}",
-                said(value),
-                said(ideal),
-                said(floor),
-                said(figure.in_floors())
-            ));
+        notes.line(format!(
+            "{name:<22} {:>10} {:>10} {:>10} {:>10}",
+            shown(value),
+            shown(ideal),
+            shown(floor),
+            shown(figure.in_floors())
+        ));
     }
     let curves = &found.curves;
-    let names: Vec<String> = families.0.iter().map(ToString::to_string).collect();
-    answer
-        .field("slices", slices)
-        .field("families", names)
-        .field("threshold", f64::from(curves.threshold))
-        .field("period", number(curves.period))
-        .field("direction", number(curves.direction))
-        .field("window", curves.window.to_vec())
-        .field("fringes", curves.fringe_lengths[1].len())
-        .field("fringes_exemplar", curves.fringe_lengths[0].len())
-        .line(format!("{slices} slices; fringes {} pixels apart", said(curves.period)));
+    notes.line(format!(
+        "{slices} slices; distance between fringes {} pixels",
+        shown(curves.period)
+    ));
     if found.fringe_length.value.is_none() || found.fringe_length.ideal.is_none() {
-        answer.warn(Warning::new(
+        notes.warn(Warning::new(
             "no-fringes",
             format!(
                 "{} fringes in the exemplar and {} in the volume lie inside windows of {} x {} pixels",
@@ -280,9 +408,21 @@ fn tell(answer: &mut Answer, found: &Comparison, slices: usize, families: &Famil
             ),
         ));
     }
+    MeasureFields {
+        figures: Figures(found.figures()),
+        slices,
+        families: families.0.iter().map(ToString::to_string).collect(),
+        threshold: f64::from(curves.threshold),
+        period: curves.period,
+        direction: curves.direction,
+        window: curves.window,
+        fringes: curves.fringe_lengths[1].len(),
+        fringes_exemplar: curves.fringe_lengths[0].len(),
+        copying: None,
+    }
 }
 
-/// A file's samples brought to 0 to 1.
+/// Reads samples and scales them to 0 to 1.
 fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let is_tiff = matches!(ending.as_deref(), Some("tif" | "tiff"));
@@ -290,7 +430,7 @@ fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, F
         Some("npy" | "nrrd" | "nhdr") => read_volume(path).at(path)?,
         Some("tif" | "tiff") => match read_volume(path) {
             Ok(stored) => stored,
-            // Photographs come in more ways than volumes.
+            // Images use more TIFF variants than volumes.
             Err(error) => match read_photo(path) {
                 Ok(photo) => return Ok(of_photo(&photo)),
                 Err(_) => return Err(error).at(path),
@@ -316,7 +456,7 @@ fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, F
         }
         _ => [low, low + 1.0],
     };
-    // Opacity is left out; beside grey only TIFF has it.
+    // Opacity is dropped; of the grey formats only TIFF has it.
     let channels = values.dim().3;
     if channels == 4 || (channels == 2 && is_tiff) {
         values = values.slice_axis(Axis(3), (..channels - 1).into()).to_owned();
@@ -325,7 +465,7 @@ fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, F
     Ok(Samples { values, guessed })
 }
 
-/// A photograph; grey if it shows nothing else.
+/// Samples of an image; one channel if it is grey.
 fn of_photo(photo: &RgbImage) -> Samples {
     let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
     let shape = (

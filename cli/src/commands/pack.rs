@@ -1,10 +1,12 @@
-//! `stereology pack`: particles without overlap in a box that repeats.
+//! `stereology pack`: particles without overlap in a periodic box.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::anneal::{
     self, Grain, PackError, PackOptions, SizeDensities, SizeInBin, box_for_fraction, count_to_fill,
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
@@ -13,21 +15,22 @@ use stereology::files::packing::PackingFile;
 use stereology::files::{densities, profiles};
 use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
-use crate::commands::pack_quality;
+use crate::answer::{Answer, Fields, Notes};
+use crate::commands::pack_quality::{self, QualityFields};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body};
-use crate::numbers::{percent, significant};
 use crate::outputs::{check_file, write_png, write_text};
 use crate::particle_files::ParticleFormat;
 use crate::particle_surfaces;
 use crate::progress::{Step, go_on};
 use crate::values::{BoxSides, ShapeShare, count, positive, share, shares};
+use stereology_report::{percent, significant};
 
-/// Packs particles of given sizes into a box that repeats in x, y and z, until a separate pass certifies that none overlap
+/// Packs particles of given sizes into a periodic box without overlap
 ///
-/// Sizes come from a table of number densities (`stereology unfold -o`), from a lognormal law, are all one, or are listed. The number of particles and the
-/// fraction of the volume they fill are met exactly; a fraction that cannot be reached is refused, with the overlap that was left.
+/// Sizes come from a table of number densities (`stereology unfold -o`), from a lognormal distribution, are all 1, or are listed in a table. The number of
+/// particles and the fraction of the volume they fill are met exactly. A separate pass certifies that no particles overlap. A fraction that cannot be reached
+/// is an error, which reports the remaining overlap.
 ///
 /// Writes packing.json: the box, the shapes, and for each particle its shape, size, category, position (centre of volume) and orientation (quaternion w,x,y,z).
 #[derive(Args, Debug)]
@@ -43,37 +46,37 @@ pub struct Pack {
     /// Side of the box, or its three sides, instead of --count
     #[arg(long = "box", value_name = "L[,L,L]", conflicts_with = "count")]
     pub side: Option<BoxSides>,
-    /// Fraction of the volume inside particles [default: what the densities say, otherwise 0.5]
+    /// Fraction of the volume inside particles [default: that of the densities, otherwise 0.5]
     #[arg(long, value_name = "PHI", value_parser = share)]
     pub fraction: Option<f64>,
-    /// Shape of the particles and its share of them; may be repeated [default: sphere]
+    /// Shape of the particles, and its fraction of their number; may be repeated [default: sphere]
     #[arg(long, value_name = "SHAPE[=F]")]
     pub shape: Vec<ShapeShare>,
-    /// How overlaps are removed
+    /// Packing algorithm
     #[arg(long, value_enum, default_value_t = Mode::Fast)]
     pub mode: Mode,
-    /// What stands for meshes while they are packed; the certificate is always that of the meshes themselves
+    /// Stand-in for meshes during packing; the certificate is always for the meshes themselves
     #[arg(long, value_enum, default_value_t = Proxy::Parts)]
     pub proxy: Proxy,
-    /// By how much of its volume the convex parts of a shape that is not convex may exceed it, 0.005 to 1
+    /// Largest volume by which the convex parts of a non-convex shape can exceed it, as a fraction of its volume, 0.005 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub tolerance: f64,
-    /// Give up after so many iterations; with --mode sequential, after so many places tried for one particle
+    /// Maximum number of iterations; with --mode sequential, of positions tried for one particle
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count)]
     pub iterations: usize,
-    /// Judge the packing too: radial distribution, order, orientations, sections
+    /// Also compute statistics of the packing: radial distribution, order, orientations, sections
     #[arg(long)]
     pub quality: bool,
     /// File for the packing (JSON)
     #[arg(short, long, value_name = "packing.json")]
     pub output: PathBuf,
-    /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView, a point a particle); may be repeated
+    /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView, one point per particle); may be repeated
     #[arg(long, value_name = "FILE")]
     pub also: Vec<PathBuf>,
-    /// Also write the particles' surfaces for ParaView, every face with its particle's number, size, shape and category
+    /// Also write the surfaces of the particles for ParaView; every face has the number, size, shape and category of its particle
     #[arg(long, value_name = "packing.vtp")]
     pub surfaces: Option<PathBuf>,
-    /// Also draw the packing (PNG)
+    /// Also write an image of the packing (PNG)
     #[arg(long, value_name = "PNG")]
     pub picture: Option<PathBuf>,
     /// Also write the energy of the overlaps at each iteration (CSV)
@@ -81,34 +84,34 @@ pub struct Pack {
     pub trace: Option<PathBuf>,
 }
 
-/// Where sizes come from.
+/// Source of the sizes.
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
 pub struct Sizes {
     /// Table of number densities, as `stereology unfold -o` writes it
     #[arg(long, value_name = "FILE")]
     pub densities: Option<PathBuf>,
-    /// Lognormal sizes of median 1 and this standard deviation of the logarithm
+    /// Lognormal sizes with median 1 and this standard deviation of the logarithm
     #[arg(long, value_name = "SIGMA", value_parser = positive)]
     pub lognormal: Option<f64>,
     /// All sizes 1
     #[arg(long)]
     pub constant: bool,
-    /// Table with a column `size`, one row a particle (CSV)
+    /// Table with a column `size` and one row per particle (CSV)
     #[arg(long, value_name = "CSV")]
     pub sizes: Option<PathBuf>,
 }
 
-/// How overlaps are removed.
+/// Packing algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     /// Descent with momentum on the energy of overlaps
     Fast,
-    /// The paper's relaxation
+    /// The relaxation of the paper
     Paper,
-    /// Simulated annealing: shifts, turns, swaps and re-insertions while it cools, then a quench
+    /// Simulated annealing with translations, rotations, swaps and re-insertions, then a quench
     Anneal,
-    /// One particle at a time at random, the largest first; jams at about 0.35
+    /// Random sequential addition, the largest particles first; reaches a fraction of about 0.35
     Sequential,
 }
 
@@ -144,18 +147,18 @@ impl Mode {
     }
 }
 
-/// What stands for meshes while they are packed.
+/// Stand-in for meshes during packing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Proxy {
-    /// Themselves, or their convex parts
+    /// The meshes themselves, or their convex parts
     Parts,
     /// Their convex hulls
     Hull,
-    /// Outlines of 26 planes
+    /// Polyhedra with 26 faces around them
     Outline,
 }
 
-/// What a failed packing means for the program's user.
+/// Explains a failed packing.
 pub fn pack_failure(error: PackError) -> Failure {
     match error {
         PackError::Cancelled => Failure::stopped(),
@@ -188,6 +191,40 @@ impl Population {
     }
 }
 
+/// JSON of `stereology pack`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PackFields {
+    /// Number of particles.
+    particles: usize,
+    /// Sides of the periodic box.
+    #[serde(rename = "box")]
+    sides: [f64; 3],
+    /// Fraction of the volume inside particles.
+    fraction: f64,
+    /// The fraction that was requested.
+    requested_fraction: f64,
+    /// Largest penetration of two particles over the mean size, from a separate pass.
+    max_overlap: f64,
+    /// Whether no particles overlap.
+    certified: bool,
+    /// Iterations used.
+    iterations: usize,
+    /// Packing algorithm.
+    mode: &'static str,
+    /// Energy of the overlaps after the last iteration; null if there was none.
+    final_energy: Option<f64>,
+    /// Number of particles expected from the densities, before rounding; with --densities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected_particles: Option<f64>,
+    /// Statistics of the packing; with --quality.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quality: Option<QualityFields>,
+}
+
+impl Fields for PackFields {
+    const COMMAND: &'static str = "pack";
+}
+
 impl Pack {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = PackOptions::default()
@@ -200,7 +237,7 @@ impl Pack {
             .with_tolerance(self.tolerance)
             .with_seed(everywhere.seed);
         if !(0.005..=1.0).contains(&self.tolerance) {
-            return Err(Failure::usage("--tolerance: a share from 0.005 to 1 is needed"));
+            return Err(Failure::usage("--tolerance: a fraction from 0.005 to 1 is needed"));
         }
         check_file(&self.output, everywhere.force)?;
         if let Some(path) = &self.surfaces {
@@ -252,17 +289,8 @@ impl Pack {
             .at(&self.output)?;
 
         let sides: [f64; 3] = packing.sides().into();
-        let mut answer = Answer::new("pack");
-        answer
-            .field("particles", packing.particles().len())
-            .field("box", sides.to_vec())
-            .field("fraction", packing.fraction())
-            .field("requested_fraction", self.fraction.unwrap_or(requested))
-            .field("max_overlap", packing.max_overlap())
-            .field("certified", packing.max_overlap() <= 0.0)
-            .field("iterations", packing.iterations())
-            .field("mode", self.mode.name())
-            .field("final_energy", packing.energies().last().copied())
+        let mut notes = Notes::default();
+        notes
             .seconds(started.elapsed().as_secs_f64())
             .line(format!(
                 "{} particles in a box of {}",
@@ -279,15 +307,27 @@ impl Pack {
                 significant(started.elapsed().as_secs_f64())
             ));
         if let Some(expected) = expected {
-            answer.field("expected_particles", expected).line(format!(
-                "{} expected from the densities; numbers above every bin edge are rounded to whole particles",
+            notes.line(format!(
+                "{} expected from the densities; cumulative numbers are rounded to whole particles",
                 significant(expected)
             ));
         }
-        if self.quality {
-            pack_quality::judge(&packing, everywhere.seed, &mut answer);
-        }
-        Ok(answer)
+        let fields = PackFields {
+            particles: packing.particles().len(),
+            sides,
+            fraction: packing.fraction(),
+            requested_fraction: self.fraction.unwrap_or(requested),
+            max_overlap: packing.max_overlap(),
+            certified: packing.max_overlap() <= 0.0,
+            iterations: packing.iterations(),
+            mode: self.mode.name(),
+            final_energy: packing.energies().last().copied(),
+            expected_particles: expected,
+            quality: self
+                .quality
+                .then(|| pack_quality::quality(&packing, everywhere.seed, &mut notes)),
+        };
+        Answer::new(&fields, notes)
     }
 
     fn shapes(&self) -> Result<Shapes, Failure> {

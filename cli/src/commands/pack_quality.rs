@@ -1,62 +1,105 @@
-//! What `stereology pack` says and shows of a finished packing: its quality, its energies, its picture.
+//! Statistics, energies and image of a finished packing for `stereology pack`.
 
 use std::fmt::Write;
 
 use image::RgbImage;
 use nalgebra::Vector3;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::anneal::{
     Distance, Packing, bond_order, carnahan_starling, orientation_tensor, radial_distribution, section_test,
 };
 use stereology::pictures::picture_of_packing;
 use stereology::render::{RenderError, RenderOptions};
 
-use crate::answer::Answer;
-use crate::numbers::significant;
+use crate::answer::Notes;
+use stereology_report::significant;
 
 /// Bins of the radial distribution, from 0 to 3 contact distances.
 const BINS: usize = 120;
 const REACH: f64 = 3.0;
-/// Centres nearer than this in contact distances are bound.
+/// Largest distance of bonded centres, in contact distances.
 const CUTOFF: f64 = 1.4;
-/// Planes across each axis, and random arrangements they are held against.
+/// Number of planes per axis, and of random arrangements they are compared with.
 const PLANES: usize = 10;
 const REPLICATES: usize = 99;
 
-/// Adds the `quality` of a packing to the answer.
-pub fn judge(packing: &Packing, seed: u64, answer: &mut Answer) {
+/// Statistics of a packing.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct QualityFields {
+    /// Radial distribution function of the centres, by distance in contact distances.
+    radial_distribution: RadialFields,
+    /// Radial distribution function at contact; null if there are too few pairs.
+    g_at_contact: Option<f64>,
+    /// The same for a fluid of equal hard spheres (Carnahan-Starling).
+    carnahan_starling: f64,
+    /// Global bond-orientational order Q6.
+    q6: f64,
+    /// Mean local bond-orientational order q6.
+    q6_local: f64,
+    /// Number of bonds.
+    bonds: usize,
+    /// Eigenvalues of the orientation tensor; null for spheres.
+    orientation_eigenvalues: Option<Vec<f64>>,
+    /// Bingham's test statistic for isotropic orientations, chi-squared with five degrees of freedom; null for spheres.
+    bingham: Option<f64>,
+    /// Profiles on plane sections compared with the expectation.
+    sections: SectionFields,
+}
+
+/// A radial distribution function.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct RadialFields {
+    /// Edges of the bins, in contact distances.
+    edges: Vec<f64>,
+    /// Value in each bin; 1 without correlation.
+    g: Vec<f64>,
+}
+
+/// Profiles on plane sections.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SectionFields {
+    /// Profiles per unit area on the planes.
+    profiles_per_area: f64,
+    /// Expected profiles per unit area.
+    expected_per_area: f64,
+    /// Probability of such a difference in random arrangements.
+    p_value: f64,
+}
+
+/// Computes the statistics of a packing, with a line for people.
+pub fn quality(packing: &Packing, seed: u64, notes: &mut Notes) -> QualityFields {
     let (particles, period) = (packing.particles(), packing.period());
     let radial = radial_distribution(particles, period, Distance::Contacts, REACH, BINS);
     let order = bond_order(particles, period, CUTOFF);
     let sections = section_test(packing, PLANES, REPLICATES, seed);
     let tensor = orientation_tensor(particles, &Vector3::z());
-    answer
-        .field(
-            "quality",
-            json!({
-                "radial_distribution": { "edges": radial.edges, "g": radial.g },
-                "g_at_contact": radial.at_contact(),
-                "carnahan_starling": carnahan_starling(packing.fraction()),
-                "q6": order.global,
-                "q6_local": order.local,
-                "bonds": order.bonds,
-                "orientation_eigenvalues": tensor.map(|t| t.eigenvalues.to_vec()),
-                "bingham": tensor.map(|t| t.bingham),
-                "sections": {
-                    "profiles_per_area": sections.profiles_per_area,
-                    "expected_per_area": sections.expected_per_area,
-                    "p_value": sections.p_value,
-                },
-            }),
-        )
-        .line(format!(
-            "sections show {} profiles per unit area, {} expected (p = {}); Q6 {} ({} is usual without order)",
-            significant(sections.profiles_per_area),
-            significant(sections.expected_per_area),
-            significant(sections.p_value),
-            significant(order.global),
-            significant((order.bonds.max(1) as f64).sqrt().recip())
-        ));
+    notes.line(format!(
+        "sections show {} profiles per unit area, {} expected (p = {}); Q6 {} ({} without order)",
+        significant(sections.profiles_per_area),
+        significant(sections.expected_per_area),
+        significant(sections.p_value),
+        significant(order.global),
+        significant((order.bonds.max(1) as f64).sqrt().recip())
+    ));
+    QualityFields {
+        g_at_contact: radial.at_contact(),
+        radial_distribution: RadialFields {
+            edges: radial.edges,
+            g: radial.g,
+        },
+        carnahan_starling: carnahan_starling(packing.fraction()),
+        q6: order.global,
+        q6_local: order.local,
+        bonds: order.bonds,
+        orientation_eigenvalues: tensor.map(|t| t.eigenvalues.to_vec()),
+        bingham: tensor.map(|t| t.bingham),
+        sections: SectionFields {
+            profiles_per_area: sections.profiles_per_area,
+            expected_per_area: sections.expected_per_area,
+            p_value: sections.p_value,
+        },
+    }
 }
 
 /// The energies as a table.
@@ -69,7 +112,7 @@ pub fn trace(packing: &Packing) -> String {
     text
 }
 
-/// The particles, lit, coloured by shape and a little by number.
+/// A rendering of the particles, coloured by shape and slightly by number.
 pub fn picture(packing: &Packing) -> Result<RgbImage, RenderError> {
     const COLOURS: [[f32; 3]; 6] = [
         [0.74, 0.45, 0.30],

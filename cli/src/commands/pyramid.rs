@@ -1,33 +1,73 @@
-//! `stereology pyramid`: the bands of a picture.
+//! `stereology pyramid`: the sub-bands of an image.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ndarray::Array2;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::pyramid::SteerablePyramid;
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::values::count;
 
-/// Takes a picture apart into the bands of a steerable pyramid and tells their statistics
+/// Decomposes an image into the sub-bands of a steerable pyramid and reports their statistics
 ///
-/// Works on the stored grey values / 255 (colour: 0.299 R + 0.587 G + 0.114 B), as one period of a picture that repeats. For each band: level (0 is the
-/// finest), orientation (null for the two residual bands), shape, mean square, minimum and maximum; and how exactly the bands rebuild the picture.
+/// Works on the stored grey values / 255 (colour: 0.299 R + 0.587 G + 0.114 B) and treats the image as periodic. Reports for each sub-band its level (0 is
+/// the finest), orientation (null for the high-pass and low-pass residuals), shape, mean square, minimum and maximum, and the largest error when the
+/// image is reconstructed from the sub-bands.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology pyramid granite.png --levels 4 --orientations 4 --json")]
 pub struct Pyramid {
-    /// Picture
+    /// Image (PNG, JPEG, TIFF)
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
-    /// Levels of the pyramid [default: by size]
+    /// Number of pyramid levels [default: depends on the size of the image]
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
-    /// Orientations of the pyramid
+    /// Number of orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
+}
+
+/// JSON of `stereology pyramid`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PyramidFields {
+    /// Width of the image in pixels.
+    width: usize,
+    /// Height of the image in pixels.
+    height: usize,
+    /// Number of levels.
+    levels: usize,
+    /// Number of orientations.
+    orientations: usize,
+    /// Statistics of each sub-band, the finest first.
+    bands: Vec<Band>,
+    /// Largest absolute error of the image reconstructed from the sub-bands.
+    reconstruction_error: f64,
+}
+
+/// Statistics of one sub-band.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Band {
+    /// Level; 0 is the finest.
+    level: usize,
+    /// Index of the orientation; null for the high-pass and the low-pass residual.
+    orientation: Option<usize>,
+    /// Rows and columns.
+    shape: [usize; 2],
+    /// Mean square of the coefficients.
+    mean_square: f64,
+    /// Least coefficient.
+    min: f64,
+    /// Greatest coefficient.
+    max: f64,
+}
+
+impl Fields for PyramidFields {
+    const COMMAND: &'static str = "pyramid";
 }
 
 impl Pyramid {
@@ -46,15 +86,15 @@ impl Pyramid {
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max);
 
-        let mut answer = Answer::new("pyramid");
-        answer.line(format!(
+        let mut notes = Notes::default();
+        notes.line(format!(
             "{width} x {height} pixels, {levels} levels, {} orientations",
             self.orientations
         ));
-        answer.line("level  orientation       shape   mean square       min       max");
+        notes.line("level  orientation       shape   mean square       min       max");
         let mut rows = Vec::new();
         for band in bands.summaries() {
-            answer.line(format!(
+            notes.line(format!(
                 "{:5}  {:>11}  {:>10}  {:12.4e}  {:8.4}  {:8.4}",
                 band.level,
                 band.orientation.map_or("residual".to_owned(), |b| b.to_string()),
@@ -63,30 +103,35 @@ impl Pyramid {
                 band.min,
                 band.max
             ));
-            rows.push(json!({
-                "level": band.level, "orientation": band.orientation, "shape": band.shape,
-                "mean_square": band.mean_square, "min": band.min, "max": band.max,
-            }));
+            rows.push(Band {
+                level: band.level,
+                orientation: band.orientation,
+                shape: band.shape,
+                mean_square: band.mean_square,
+                min: band.min,
+                max: band.max,
+            });
         }
-        answer.line(format!("rebuilt to within {error:.1e}"));
-        answer
-            .field("width", width)
-            .field("height", height)
-            .field("levels", levels)
-            .field("orientations", self.orientations)
-            .field("bands", rows)
-            .field("reconstruction_error", error);
-        Ok(answer)
+        notes.line(format!("largest reconstruction error {error:.1e}"));
+        let fields = PyramidFields {
+            width,
+            height,
+            levels,
+            orientations: self.orientations,
+            bands: rows,
+            reconstruction_error: error,
+        };
+        Answer::new(&fields, notes)
     }
 }
 
-/// Stored grey values / 255 (rows, columns); of colours 0.299 R + 0.587 G + 0.114 B.
+/// Stored grey values / 255 (rows, columns); for colours 0.299 R + 0.587 G + 0.114 B.
 fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
     let picture = image::ImageReader::open(path)
         .and_then(image::ImageReader::with_guessed_format)
         .at(path)?
         .decode()
-        .map_err(|error| format!("is no picture that can be read ({error}); PNG, JPEG and TIFF can"))
+        .map_err(|error| format!("cannot be read as an image ({error}); use PNG, JPEG or TIFF"))
         .at(path)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let values: Vec<f64> = if picture.color().has_color() {

@@ -1,29 +1,31 @@
-//! `stereology render`: a picture of the solid, or of a mesh carved from it.
+//! `stereology render`: a rendering of the solid, or of a mesh carved from it.
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nalgebra::{Point3, UnitVector3, Vector3};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::pictures::picture_of_solid;
 use stereology::render::{BlockOptions, Camera, RenderError, RenderOptions};
 use stereology::shape::{TriangleMesh, read_mesh};
 use stereology::volume::{Solid, turned};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::slice::open_solid;
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{check_file, write_png};
 use crate::progress::Step;
 use crate::values::{Triple, count, not_negative, positive};
 
-/// Renders a finished solid: one period of it as a block, or a mesh carved from it
+/// Renders a finished solid: one period as a block, or a mesh carved from it
 ///
-/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn as the paper shows it, with three faces seen. A mesh (.obj, .stl,
-/// .ply) is placed with its longest side on one period of the solid, or as --period says, and its surface shows the solid's colours there.
+/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn with three faces visible, as in the paper. The longest side of a mesh
+/// (.obj, .stl, .ply) spans one period of the solid, unless --period gives another length, and its surface shows the colours of the solid there.
 ///
-/// Light is followed from surface to surface. Pictures are clean at any number of samples; 8 x 8 a pixel (--samples 8) are unbiased.
+/// Light is traced from surface to surface. Images are free of noise at any number of samples; with 8 x 8 per pixel (--samples 8) they are unbiased.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology render out --mesh bunny.obj --up y --camera 2,1.5,3 -o bunny.png\n         stereology render out --mesh bunny.obj --up y --turntable 72 -o bunny.png; ffmpeg -i bunny_%03d.png bunny.mp4"
@@ -32,34 +34,34 @@ pub struct Render {
     /// Folder of a solid, written by `stereology synthesize`
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
-    /// Mesh to carve and show
+    /// Mesh to carve and render
     #[arg(long, value_name = "MESH")]
     pub mesh: Option<PathBuf>,
-    /// Length in the mesh that one period of the solid takes [default: the mesh's longest side]
+    /// Length of one period of the solid, in units of the mesh [default: the mesh's longest side]
     #[arg(long, value_name = "LENGTH", value_parser = positive, requires = "mesh")]
     pub period: Option<f64>,
-    /// Turn the solid in the mesh, or the block, so that flat faces do not show its period
+    /// Rotate the solid within the mesh or block, so that flat faces do not show its period
     #[arg(long)]
     pub turned: bool,
     /// Direction from the centre to the camera [default: from the front, above]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub camera: Option<Triple>,
-    /// The axis that points up: most mesh files have y
+    /// Axis that points up; y in most mesh files
     #[arg(long, value_enum, default_value_t = Axis::Z)]
     pub up: Axis,
-    /// Width and height of the picture in pixels
+    /// Width and height of the image in pixels
     #[arg(long, value_name = "PX", default_value_t = 768, value_parser = count)]
     pub size: usize,
-    /// Places each way in which a pixel is looked at, 1 to 16
+    /// Samples per pixel along each axis, 1 to 16
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub samples: u32,
-    /// Clear coat, from 0, dull, to 1, polished [default: 0 for the block, 0.5 for a mesh]
+    /// Clear coat, from 0 (matt) to 1 (polished) [default: 0 for the block, 0.5 for a mesh]
     #[arg(long, value_name = "G", value_parser = not_negative)]
     pub gloss: Option<f64>,
-    /// So many pictures once around the upright axis, PNG with _000, _001, ... before its ending
+    /// Render this many images in one turn around the upright axis; _000, _001, ... is added to the name of the PNG file
     #[arg(long, value_name = "N", value_parser = count)]
     pub turntable: Option<usize>,
-    /// File for the picture
+    /// Image to write
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
 }
@@ -80,6 +82,21 @@ impl Axis {
             Self::Z => Vector3::z_axis(),
         }
     }
+}
+
+/// JSON of `stereology render`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct RenderFields {
+    /// Width of an image in pixels.
+    width: u32,
+    /// Height of an image in pixels.
+    height: u32,
+    /// Number of images written.
+    pictures: usize,
+}
+
+impl Fields for RenderFields {
+    const COMMAND: &'static str = "render";
 }
 
 impl Render {
@@ -117,21 +134,22 @@ impl Render {
             write_png(file, &picture)?;
         }
         drop(step);
-        let mut answer = Answer::new("render");
         let written = match files.as_slice() {
             [file] => format!("written to {}", file.display()),
             [first, .., last] => format!("each, {} to {}", first.display(), last.display()),
             [] => String::new(),
         };
-        answer
-            .field("width", options.width)
-            .field("height", options.height)
-            .field("pictures", files.len())
-            .line(format!("{} x {} pixels {written}", options.width, options.height));
-        Ok(answer)
+        let mut notes = Notes::default();
+        notes.line(format!("{} x {} pixels {written}", options.width, options.height));
+        let fields = RenderFields {
+            width: options.width,
+            height: options.height,
+            pictures: files.len(),
+        };
+        Answer::new(&fields, notes)
     }
 
-    /// The picture, or those of a turntable.
+    /// The image, or those of a turntable.
     fn files(&self) -> Vec<PathBuf> {
         let Some(frames) = self.turntable else {
             return vec![self.output.clone()];
@@ -144,7 +162,7 @@ impl Render {
             .collect()
     }
 
-    /// What is seen, in the solid, and how it is shown unless told otherwise.
+    /// The mesh to render, in coordinates of the solid, and its default camera and options.
     fn scene(&self, solid: &Solid) -> Result<(TriangleMesh, BlockOptions), Failure> {
         let block = BlockOptions::default();
         let Some(path) = &self.mesh else {
@@ -183,7 +201,7 @@ impl Render {
     }
 }
 
-/// Where a mesh lies in the solid.
+/// Position of a mesh in the solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
     from: Vector3<f64>,
@@ -191,7 +209,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// From the origin on, one period of the solid as long as `period` of the mesh: its longest side if not given.
+    /// Moves the mesh to the origin and scales it so that `period` (by default its longest side) is one period of the solid.
     pub fn of(mesh: &TriangleMesh, solid: &Solid, period: Option<f64>) -> Self {
         let fold = |start: f64, further: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
             let vertices = mesh.vertices.iter();
@@ -199,7 +217,7 @@ impl Placement {
         };
         let (low, high) = (fold(f64::INFINITY, Vector3::inf), fold(f64::NEG_INFINITY, Vector3::sup));
         let scale = solid.period().sides().max() / period.unwrap_or_else(|| (high - low).max());
-        // A mesh without size stays where it is, to be refused by who looks at its triangles.
+        // A mesh without extent stays in place; the renderer refuses it.
         if scale.is_finite() && scale > 0.0 {
             Self { from: low, scale }
         } else {
@@ -210,7 +228,7 @@ impl Placement {
         }
     }
 
-    /// Where in the solid a point of the mesh is.
+    /// Point of the solid at a point of the mesh.
     pub fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
         Point3::from((p.coords - self.from) * self.scale)
     }

@@ -1,44 +1,44 @@
-//! `stereology segment`: a photograph -> profiles.
+//! `stereology segment`: from a photograph to profiles.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::files::profiles;
 use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, read_photo_up_to, write_labels};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::{percent, significant};
 use crate::outputs::{OutputFolder, check_file, write_json};
 use crate::progress::{Step, go_on};
 use crate::values::{BinderArgument, CategoriesArgument, pair, positive};
 use crate::warnings::Warning;
+use stereology_report::{percent, significant};
 
-/// Finds the profiles of particles on a photograph of a cut
+/// Finds the profiles of particles in a photograph of a plane section
 ///
-/// Tells particles from the binder between them, outlines each profile, measures it, and takes the photograph apart into mean colours and residual texture.
-/// A photograph without separable particles (no binder colour, or nothing in it) is refused or warned of: outline such particles with another tool and import
-/// its label map with --labels.
+/// Separates particles from the binder (the matrix between them), outlines and measures each profile, and decomposes the photograph into mean colours and a
+/// residual texture. A photograph without separable particles (no binder colour, or no particles) is refused or gives a warning; outline the particles with
+/// another tool and import its label map with --labels.
 ///
-/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category,
-/// touches_edge, weight; colours 0 to 255), overlay.png (look at this first),
-/// binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (its picture) and summary.json.
+/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge, weight; colours 0 to 255), overlay.png
+/// (look at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing) and summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
 pub struct Segment {
-    /// Photograph (PNG, JPEG, TIFF; 8 or 16 bits, grey or colour, with or without alpha)
+    /// Photograph of a plane section (PNG, JPEG, TIFF; 8 or 16 bits, grey or colour, with or without alpha)
     #[arg(value_name = "PHOTO")]
     pub photo: PathBuf,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Write the labels to further files too, to correct them in another tool and come back with --labels; the ending tells the kind: .tif, .png, .npy (napari), .zip (Fiji's ROI manager), .geojson (QGIS),
-    /// .json (COCO)
+    /// Also write the labels to this file, to correct them in another tool and import them with --labels; the extension selects the format: .tif, .png, .npy
+    /// (napari), .zip (Fiji's ROI manager), .geojson (QGIS), .json (COCO); may be repeated
     #[arg(long, value_name = "FILE")]
     pub labels_out: Vec<PathBuf>,
-    /// Refuse photographs of more pixels; segmenting takes about 100 bytes a pixel
+    /// Refuse photographs with more pixels; segmentation needs about 100 bytes per pixel
     #[arg(long, value_name = "N", default_value_t = 150_000_000)]
     pub max_pixels: u64,
     #[command(flatten)]
@@ -50,52 +50,52 @@ pub struct Segment {
 #[command(next_help_heading = "Segmentation")]
 #[group(id = "segment-choices")]
 pub struct Choices {
-    /// Label map of another tool instead of segmenting: TIFF, PNG or .npy of numbers (0 = binder), GeoJSON polygons, ImageJ ROI zip, COCO annotations
+    /// Import this label map instead of segmenting: TIFF, PNG or .npy with numbers (0 = binder), GeoJSON polygons, ImageJ ROI zip, COCO annotations
     #[arg(long, value_name = "FILE")]
     pub labels: Option<PathBuf>,
-    /// Colour of the binder, 0 to 255, or N for the Nth of the photograph's main colours, from 0 [default: found in the photograph]
+    /// Colour of the binder, 0 to 255, or the number N, from 0, of one of the photograph's main colours [default: found in the photograph]
     #[arg(long, value_name = "R,G,B|N")]
     pub binder: Option<BinderArgument>,
-    /// Smallest area of a profile in pixels
+    /// Minimum area of a profile in pixels
     #[arg(long, value_name = "PX", value_parser = positive)]
     pub min_area: Option<f64>,
-    /// Number of colour categories of the particles, or how to choose it: `silhouette` or `gap` [default: silhouette]
+    /// Number of colour categories of the particles, or the criterion that selects it: `silhouette` or `gap` [default: silhouette]
     #[arg(long, value_name = "K|HOW")]
     pub categories: Option<CategoriesArgument>,
-    /// Standard deviation of the smoothing before segmenting, in pixels
+    /// Standard deviation of the Gaussian filter before segmentation, in pixels
     #[arg(long, value_name = "PX", default_value_t = 1.0)]
     pub smoothing: f32,
-    /// Distances to the binder, in its standard deviations, at which a particle ends and which it must reach
+    /// Low and high hysteresis thresholds, in standard deviations of the binder colour
     #[arg(long, value_name = "LOW,HIGH", default_value = "5,9", value_parser = pair)]
     pub thresholds: [f32; 2],
-    /// Height above their neck from which touching parts are particles of their own: pixels, and share of their depth
-    #[arg(long, value_name = "PX,SHARE", default_value = "0.7,0.1", value_parser = pair)]
+    /// Minimum peak-to-saddle height for splitting touching particles: in pixels, and as a fraction of the peak
+    #[arg(long, value_name = "PX,FRACTION", default_value = "0.7,0.1", value_parser = pair)]
     pub rise: [f32; 2],
-    /// Holes in profiles: filled, or kept (for particles with annular sections)
+    /// Whether holes in profiles are filled, or kept for particles with annular sections
     #[arg(long, value_enum, default_value_t = Holes::Fill)]
     pub holes: Holes,
-    /// Which profiles at the photograph's edge count, and how much
+    /// Rule for profiles at the edge of the photograph
     #[arg(long, value_enum, default_value_t = EdgeRule::Frame)]
     pub edge_rule: EdgeRule,
 }
 
-/// What becomes of holes in profiles.
+/// Treatment of holes in profiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Holes {
-    /// Part of the profile
+    /// Holes are part of the profile
     Fill,
-    /// Binder
+    /// Holes are binder
     Keep,
 }
 
-/// How profiles at the photograph's edge are counted.
+/// Rule for profiles at the edge of the photograph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EdgeRule {
-    /// Unbiased counting frame: profiles that touch two of the sides are left out
+    /// Unbiased counting frame: profiles that touch the two forbidden sides are excluded
     Frame,
-    /// Profiles wholly inside, weighted by the chance to be so
+    /// Profiles entirely inside, weighted by the reciprocal probability of being so (Miles-Lantuejoul)
     MilesLantuejoul,
-    /// All, cut ones as they are: biased, for comparison
+    /// All profiles, truncated ones too: biased, for comparison
     All,
 }
 
@@ -155,19 +155,16 @@ impl Segment {
         };
         drop(step);
         go_on()?;
-        let mut answer = Answer::new("segment");
-        for (name, value) in figures(&found, everywhere.scale) {
-            answer.field(name, value);
-        }
+        let mut notes = Notes::default();
         findings.extend(found.findings.iter().cloned());
         for finding in &findings {
-            answer.warn(Warning::new(finding.code, finding.message.clone()));
+            notes.warn(Warning::new(finding.code, finding.message.clone()));
         }
         let (window, scale) = (found.window, everywhere.scale);
         let counted = found.profiles.iter().filter(|profile| profile.weight > 0.0).count();
-        answer
+        notes
             .line(format!(
-                "{} profiles found, {counted} of them counted by the edge rule",
+                "{} profiles found, of which the edge rule counts {counted}",
                 found.profiles.len()
             ))
             .line(format!("area fraction      {}", percent(found.area_fraction)))
@@ -188,6 +185,7 @@ impl Segment {
         for path in &self.labels_out {
             write_labels(path, found.labels.view()).at(path)?;
         }
+        let answer = Answer::new(&SegmentFields::of(&found, scale), notes)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
         folder.publish()?;
@@ -195,56 +193,109 @@ impl Segment {
     }
 }
 
-/// Fields of the summary, lengths times `scale`.
-pub fn figures(found: &Segmentation, scale: f64) -> Vec<(&'static str, Value)> {
-    let mean_size = |category: usize| {
-        let sizes: Vec<f64> = found
-            .profiles
-            .iter()
-            .filter(|p| usize::from(p.category) == category)
-            .map(|p| p.size * scale)
-            .collect();
-        sizes.iter().sum::<f64>() / sizes.len() as f64
-    };
-    let colours: Vec<Value> = found
-        .categories
-        .iter()
-        .enumerate()
-        .map(|(k, category)| {
-            json!({ "colour": category.colour.map(|c| 255.0 * c), "profiles": category.profiles, "mean_size": mean_size(k) })
-        })
-        .collect();
-    vec![
-        ("profiles", json!(found.profiles.len())),
-        ("area_fraction", json!(found.area_fraction)),
-        ("number_per_area", json!(found.number_per_area / (scale * scale))),
-        ("min_size", json!(found.min_size * scale)),
-        ("categories", json!(found.categories.len())),
-        (
-            "window",
-            json!({
-                "width": found.window.width as f64 * scale,
-                "height": found.window.height as f64 * scale,
-                "area": found.window.area * scale * scale,
-            }),
-        ),
-        (
-            "counted",
-            json!(found.profiles.iter().filter(|profile| profile.weight > 0.0).count()),
-        ),
-        ("binder", json!(found.binder.colour.map(|c| 255.0 * c))),
-        ("category_colours", json!(colours)),
-        (
-            "size_by_category",
-            found.size_by_category.map_or(
-                Value::Null,
-                |test| json!({ "test": "kruskal-wallis", "statistic": test.statistic, "p_value": test.p_value }),
-            ),
-        ),
-    ]
+/// JSON of `stereology segment`, and `segment` in that of `stereology synthesize`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SegmentFields {
+    /// Number of profiles found.
+    profiles: usize,
+    /// Fraction of the area inside profiles.
+    area_fraction: f64,
+    /// Profiles per unit area.
+    number_per_area: f64,
+    /// Detection limit: the size of the smallest profile that is kept.
+    min_size: f64,
+    /// Number of colour categories.
+    categories: usize,
+    /// The photograph.
+    window: WindowFields,
+    /// Profiles that the edge rule counts.
+    counted: usize,
+    /// Colour of the binder (r, g, b), 0 to 255.
+    binder: [f64; 3],
+    /// Colour categories of the particles.
+    category_colours: Vec<CategoryFields>,
+    /// Test whether sizes differ between categories; null if there is one category.
+    size_by_category: Option<TestFields>,
 }
 
-/// Writes all files of a segmentation but the summary, lengths times `scale`.
+/// The examined area.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct WindowFields {
+    /// Width of the photograph.
+    width: f64,
+    /// Height of the photograph.
+    height: f64,
+    /// Area in which profiles are counted.
+    area: f64,
+}
+
+/// A colour category.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CategoryFields {
+    /// Mean colour (r, g, b), 0 to 255.
+    colour: [f64; 3],
+    /// Number of profiles.
+    profiles: usize,
+    /// Mean size of the profiles; null if there are none.
+    mean_size: Option<f64>,
+}
+
+/// A test of significance.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TestFields {
+    /// Name of the test.
+    test: &'static str,
+    /// Test statistic.
+    statistic: f64,
+    /// Probability of such a statistic if the null hypothesis holds.
+    p_value: f64,
+}
+
+impl Fields for SegmentFields {
+    const COMMAND: &'static str = "segment";
+}
+
+impl SegmentFields {
+    /// The fields of a segmentation; lengths are multiplied by `scale`.
+    pub fn of(found: &Segmentation, scale: f64) -> Self {
+        let mean_size = |category: usize| {
+            let sizes: Vec<f64> = found
+                .profiles
+                .iter()
+                .filter(|p| usize::from(p.category) == category)
+                .map(|p| p.size * scale)
+                .collect();
+            Some(sizes.iter().sum::<f64>() / sizes.len() as f64).filter(|mean| mean.is_finite())
+        };
+        let colours = found.categories.iter().enumerate().map(|(k, category)| CategoryFields {
+            colour: category.colour.map(|c| 255.0 * c),
+            profiles: category.profiles,
+            mean_size: mean_size(k),
+        });
+        Self {
+            profiles: found.profiles.len(),
+            area_fraction: found.area_fraction,
+            number_per_area: found.number_per_area / (scale * scale),
+            min_size: found.min_size * scale,
+            categories: found.categories.len(),
+            window: WindowFields {
+                width: found.window.width as f64 * scale,
+                height: found.window.height as f64 * scale,
+                area: found.window.area * scale * scale,
+            },
+            counted: found.profiles.iter().filter(|profile| profile.weight > 0.0).count(),
+            binder: found.binder.colour.map(|c| 255.0 * c),
+            category_colours: colours.collect(),
+            size_by_category: found.size_by_category.map(|test| TestFields {
+                test: "kruskal-wallis",
+                statistic: test.statistic,
+                p_value: test.p_value,
+            }),
+        }
+    }
+}
+
+/// Writes all files of a segmentation except the summary; lengths are multiplied by `scale`.
 pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64) -> Result<(), Failure> {
     let labels = folder.file("labels.tif");
     write_labels(&labels, found.labels.view()).at(&labels)?;

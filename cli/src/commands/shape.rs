@@ -1,28 +1,31 @@
 //! `stereology shape`: a body as a mesh file.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::shape::{Body, BodyKind, ClosedMesh, ControlSphere, MeshFormat, Subdivision, TriangleMesh, write_mesh};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body_welding};
-use crate::numbers::significant;
 use crate::outputs::{check_file, write_text};
 use crate::values::positive;
 use crate::warnings::Warning;
+use stereology_report::significant;
 
-/// A shape as a mesh file
+/// Writes a shape as a mesh file
 ///
-/// SPEC is a SHAPE (`sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file), a rough rock `rock:SEED,ROUGHNESS` (0.02 worn, 0.1
-/// jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes; exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of points
-/// `hull:FILE`, or a sphere edited by its control points (.json), as the paper's particles were made.
+/// SPEC is a SHAPE (`sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file), a rough rock `rock:SEED,ROUGHNESS` (0.02 is worn, 0.1
+/// jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes and exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of
+/// points `hull:FILE`, or a sphere edited by its control points (.json), which is how the particles of the paper were modelled.
 ///
-/// The FILE of a hull is a mesh file, of which the vertices are taken, or text (.csv, .xyz, .txt): a point a row, x, y, z separated by commas, semicolons,
-/// tabs or blanks. A header may name the columns x, y, z in any order; without one the first three are taken. Rows that begin with # are skipped.
+/// The FILE of a hull is a mesh file, whose vertices are taken, or a text file (.csv, .xyz, .txt) with one point per row: x, y, z separated by commas,
+/// semicolons, tabs or blanks. A header may name the columns x, y, z in any order; without a header the first three columns are taken. Rows that begin with
+/// # are skipped.
 ///
-/// A sphere or an ellipsoid written to a .json file gives the control points to start from. What is written can be given as SHAPE to every other command.
+/// Writing a sphere or an ellipsoid to a .json file gives control points to start from. Every other command accepts the written file as SHAPE.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology shape superellipsoid:1,1,0.5,0.5,0.5 -o pillow.obj\n          \
@@ -31,34 +34,67 @@ use crate::warnings::Warning;
                              stereology shape hull:corners.csv -o grain.obj"
 )]
 pub struct Shape {
-    /// What to write
+    /// Shape to write
     #[arg(value_name = "SPEC")]
     pub spec: String,
-    /// Mesh file to write: .obj, .ply (all digits), .stl (single precision); or .json for control points
+    /// Mesh file to write: .obj, .ply (double precision), .stl (single precision); or .json for control points
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// How often each triangle is split in four; spheres and ellipsoids are icospheres split this often [default: 0; 5 for spheres and ellipsoids]
+    /// Number of subdivisions, each of which splits every triangle into four; spheres and ellipsoids start from an icosahedron [default: 0; 5 for spheres and ellipsoids]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=7))]
     pub subdivide: Option<u32>,
-    /// Flat, or rounded by Loop's scheme
+    /// Subdivision scheme: flat, or smoothed by Loop's scheme
     #[arg(long, value_enum, default_value_t = Scheme::Midpoint)]
     pub scheme: Scheme,
-    /// Join vertices of a mesh file that are nearer than this to each other, in its units
+    /// Merge vertices of a mesh file that are closer than this, in units of the mesh
     #[arg(long, value_name = "DISTANCE", value_parser = positive)]
     pub weld: Option<f64>,
 }
 
-/// How triangles are split.
+/// How triangles are subdivided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scheme {
-    /// At the middles of their edges: the same solid
+    /// At the midpoints of the edges: the surface is unchanged
     Midpoint,
-    /// Smoothed (Loop 1987)
+    /// Loop's scheme (1987), which smooths the surface
     Loop,
 }
 
-/// More triangles than this are refused.
+/// Largest number of triangles that is written.
 const MOST_TRIANGLES: usize = 20_000_000;
+
+/// JSON of `stereology shape`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ShapeFields {
+    /// The shape as it was given.
+    shape: String,
+    /// File that was written.
+    output: String,
+    /// Vertices written; null for control points.
+    vertices: Option<usize>,
+    /// Triangles written; null for control points.
+    triangles: Option<usize>,
+    /// Volume of the shape.
+    volume: f64,
+    /// Surface area of the shape.
+    surface_area: f64,
+    /// Mean caliper (mean width) of the convex hull.
+    caliper_hull: f64,
+    /// Mean width from the signed edge angles, which counts concave edges as negative.
+    caliper_chi: f64,
+    /// Area of the largest plane section.
+    max_area: f64,
+    /// Diameter of the circle with the area of the largest section.
+    size: f64,
+    /// Whether the shape is convex.
+    convex: bool,
+    /// What was repaired in the mesh.
+    repairs: Vec<String>,
+}
+
+impl Fields for ShapeFields {
+    const COMMAND: &'static str = "shape";
+}
 
 impl Shape {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
@@ -71,7 +107,6 @@ impl Shape {
             MeshFormat::from_path(&self.output).or_usage("-o")?;
         }
         let body = body_welding(&self.spec, self.weld)?;
-        let mut answer = Answer::new("shape");
         let written = if wants_control_points {
             write_text(&self.output, &self.control_points(&body)?.to_json())?;
             None
@@ -80,8 +115,7 @@ impl Shape {
             write_mesh(&self.output, &mesh).at(&self.output)?;
             Some(mesh)
         };
-        self.tell(&body, written.as_ref(), &mut answer);
-        Ok(answer)
+        self.answer(&body, written.as_ref())
     }
 
     fn mesh(&self, body: &Body) -> Result<TriangleMesh, Failure> {
@@ -92,7 +126,7 @@ impl Shape {
         let triangles = mesh.triangles().len() << (2 * times);
         if triangles > MOST_TRIANGLES {
             return Err(Failure::usage(format!(
-                "--subdivide {times} would make {triangles} triangles, more than {MOST_TRIANGLES}; subdivide less"
+                "--subdivide {times} would make {triangles} triangles, more than {MOST_TRIANGLES}; use fewer subdivisions"
             )));
         }
         let scheme = match self.scheme {
@@ -101,7 +135,7 @@ impl Shape {
         };
         let fine = mesh.subdivided(scheme, times);
         if times > 0 {
-            // Smoothing must not have made the surface cross itself.
+            // Smoothing can make the surface intersect itself.
             ClosedMesh::try_from(fine.clone())
                 .map_err(|error| format!("{}, subdivided: {error}", self.spec))
                 .or_fail()?;
@@ -127,36 +161,38 @@ impl Shape {
         Ok(sphere)
     }
 
-    fn tell(&self, body: &Body, written: Option<&TriangleMesh>, answer: &mut Answer) {
-        let name = |path: &Path| path.display().to_string();
-        answer
-            .field("shape", self.spec.as_str())
-            .field("output", name(&self.output))
-            .field("vertices", written.map(|mesh| mesh.vertices.len()))
-            .field("triangles", written.map(|mesh| mesh.triangles.len()))
-            .field("volume", body.volume())
-            .field("surface_area", body.surface_area())
-            .field("caliper_hull", body.mean_width())
-            .field("caliper_chi", body.signed_mean_width())
-            .field("max_area", body.largest_section_area())
-            .field("size", body.size())
-            .field("convex", body.is_convex())
-            .line(format!(
-                "{}: {} triangles, volume {}, surface {}, mean caliper {}, size {} -> {}",
-                self.spec,
-                written.map_or(0, |mesh| mesh.triangles.len()),
-                significant(body.volume()),
-                significant(body.surface_area()),
-                significant(body.mean_width()),
-                significant(body.size()),
-                name(&self.output)
-            ));
-        tell_repairs(&self.spec, body, answer);
+    fn answer(&self, body: &Body, written: Option<&TriangleMesh>) -> Result<Answer, Failure> {
+        let mut notes = Notes::default();
+        let fields = ShapeFields {
+            shape: self.spec.clone(),
+            output: self.output.display().to_string(),
+            vertices: written.map(|mesh| mesh.vertices.len()),
+            triangles: written.map(|mesh| mesh.triangles.len()),
+            volume: body.volume(),
+            surface_area: body.surface_area(),
+            caliper_hull: body.mean_width(),
+            caliper_chi: body.signed_mean_width(),
+            max_area: body.largest_section_area(),
+            size: body.size(),
+            convex: body.is_convex(),
+            repairs: repairs(&self.spec, body, &mut notes),
+        };
+        notes.line(format!(
+            "{}: {} triangles, volume {}, surface area {}, mean caliper {}, size {} -> {}",
+            self.spec,
+            fields.triangles.unwrap_or(0),
+            significant(fields.volume),
+            significant(fields.surface_area),
+            significant(fields.caliper_hull),
+            significant(fields.size),
+            fields.output
+        ));
+        Answer::new(&fields, notes)
     }
 }
 
-/// What was mended of a mesh: the field `repairs`, and a warning if there was anything.
-pub fn tell_repairs(spec: &str, body: &Body, answer: &mut Answer) {
+/// What was repaired in the body's mesh, with a warning if anything was.
+pub fn repairs(spec: &str, body: &Body, notes: &mut Notes) -> Vec<String> {
     let repairs: Vec<String> = body
         .mesh()
         .map_or(&[][..], |mesh| mesh.repairs())
@@ -164,7 +200,7 @@ pub fn tell_repairs(spec: &str, body: &Body, answer: &mut Answer) {
         .map(ToString::to_string)
         .collect();
     if !repairs.is_empty() {
-        answer.warn(Warning::new("mesh-repaired", format!("{spec}: {}", repairs.join("; "))));
+        notes.warn(Warning::new("mesh-repaired", format!("{spec}: {}", repairs.join("; "))));
     }
-    answer.field("repairs", repairs);
+    repairs
 }

@@ -1,34 +1,36 @@
-//! `stereology slice`: a picture of a cut through a solid.
+//! `stereology slice`: an image of a plane section through a solid.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::files::solid::{self, SavedSolid};
 use stereology::volume::{self, SlicePlane};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::significant;
 use crate::outputs::{check_file, write_png};
 use crate::progress::go_on;
 use crate::values::{Triple, count, finite};
+use stereology_report::significant;
 
-/// Cuts a finished solid by a plane and writes the picture of the cut
+/// Slices a finished solid with a plane and writes an image of the section
 ///
-/// DIR is an output folder of `stereology synthesize`. The plane stands across an axis, --at a fraction of the box's side (0.3 is 30 %), or is any plane
-/// with a --normal at --offset from the origin along it. The picture shows one period of the solid.
+/// DIR is an output folder of `stereology synthesize`. The plane is perpendicular to an --axis, at a fraction --at of the box's side (0.3 is 30 %), or it
+/// is given by a --normal and its --offset from the origin along the normal. The image shows one period of the solid.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology slice out --axis z --at 0.3 --size 512 -o cut.png")]
 pub struct Slice {
     /// Folder of a solid, written by `stereology synthesize`
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
-    /// Axis the plane stands across [default: z]
+    /// Axis perpendicular to the slice [default: z]
     #[arg(long, value_enum, conflicts_with = "normal")]
     pub axis: Option<Axis>,
-    /// Where along the axis, as a fraction of the box's side [default: 0.5]
+    /// Position along the axis, as a fraction of the box's side [default: 0.5]
     #[arg(long, value_name = "F", value_parser = finite, allow_negative_numbers = true, conflicts_with = "normal")]
     pub at: Option<f64>,
     /// Normal of the plane, of any length, instead of --axis
@@ -37,10 +39,10 @@ pub struct Slice {
     /// Distance of the plane from the origin along the normal [default: 0]
     #[arg(long, value_name = "D", value_parser = finite, allow_negative_numbers = true, requires = "normal")]
     pub offset: Option<f64>,
-    /// Pixels along the longer side of the picture
+    /// Pixels along the longer side of the image
     #[arg(long, value_name = "PX", default_value_t = 512, value_parser = count)]
     pub size: usize,
-    /// File for the picture
+    /// Image to write
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
 }
@@ -51,6 +53,21 @@ pub enum Axis {
     X,
     Y,
     Z,
+}
+
+/// JSON of `stereology slice`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SliceFields {
+    /// Width of the image in pixels.
+    width: u32,
+    /// Height of the image in pixels.
+    height: u32,
+    /// Side of a pixel in units of length.
+    pixel: f64,
+}
+
+impl Fields for SliceFields {
+    const COMMAND: &'static str = "slice";
 }
 
 impl Slice {
@@ -78,28 +95,29 @@ impl Slice {
         let picture = solid.slice(&plane, pixels(across), pixels(down), pixel).or_fail()?;
         go_on()?;
         write_png(&self.output, &picture)?;
-        let mut answer = Answer::new("slice");
-        answer
-            .field("width", picture.width())
-            .field("height", picture.height())
-            .field("pixel", pixel)
-            .line(format!(
-                "{} x {} pixels of edge {} written to {}",
-                picture.width(),
-                picture.height(),
-                significant(pixel),
-                self.output.display()
-            ));
-        Ok(answer)
+        let mut notes = Notes::default();
+        notes.line(format!(
+            "{} x {} pixels with side {} written to {}",
+            picture.width(),
+            picture.height(),
+            significant(pixel),
+            self.output.display()
+        ));
+        let fields = SliceFields {
+            width: picture.width(),
+            height: picture.height(),
+            pixel,
+        };
+        Answer::new(&fields, notes)
     }
 }
 
-/// Opens a folder of `stereology synthesize`.
+/// Opens an output folder of `stereology synthesize`.
 pub fn open_solid(folder: &Path) -> Result<SavedSolid, Failure> {
     let parts = ["solid.json", "packing.json", "texture.npy"];
     if let Some(missing) = parts.iter().find(|part| !folder.join(part).is_file()) {
         return Err(Failure::run(format!(
-            "{}: holds no {missing}; give a folder written by `stereology synthesize`",
+            "{} contains no {missing}; give a folder written by `stereology synthesize`",
             folder.display()
         )));
     }

@@ -1,16 +1,21 @@
-//! `stereology synthesize`: a photograph in, a solid out.
+//! `stereology synthesize`: from a photograph to a solid.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
 use image::{Rgb, RgbImage, imageops};
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use stereology::anneal::PackOptions;
 use stereology::files;
 use stereology::grid::Format;
 use stereology::pictures::picture_of_solid;
-use stereology::pipeline::{self, Comparison, Extent, ParticleTypes, Synthesis, SynthesisError, SynthesisOptions};
+use stereology::pipeline::{
+    self, Check, CheckName, Comparison, Extent, Level, Opinion, ParticleTypes, Synthesis, SynthesisError,
+    SynthesisOptions, Verdict,
+};
 use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
 use stereology::sample;
@@ -18,31 +23,34 @@ use stereology::segment::{read_labels_for, read_photo};
 use stereology::shape::TriangleMesh;
 use stereology::volume::{Channel, SlicePlane};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
 use crate::commands::pack::pack_failure;
-use crate::commands::unfold::{Defaults, types};
+use crate::commands::segment::SegmentFields;
+use crate::commands::unfold::{Defaults, UnfoldingFields, types};
 use crate::commands::{pack, segment, texture, unfold};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::{counted, percent, significant};
 use crate::outputs::{OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Stages, go_on};
-use crate::report::{self, Pictures, report_input};
 use crate::values::{ShapeShare, count, positive, share};
+use crate::warnings::advice;
+use stereology_report::{
+    Invocation, Remark, SolidImages, SynthesisReport, counted, percent, significant, synthesis_page,
+};
 
-/// From a photograph of a cut to the solid it came from, and a report that tells whether to trust it
+/// Reconstructs a solid from a photograph of a plane section, with a report on its reliability
 ///
-/// Segments PHOTO, unfolds its profiles to particles per volume, packs such particles without overlap into a box that repeats, gives them the photograph's
-/// colours, and resynthesises the residual texture in three dimensions. Then sections of the solid are measured and segmented like the photograph and
-/// compared with it. Without PHOTO a built-in sample is used: `stereology synthesize -o out` shows all there is to see.
+/// Segments PHOTO, unfolds its profiles to particles per volume, packs such particles without overlap into a periodic box, gives them the photograph's colours,
+/// and synthesises the residual texture in three dimensions. Sections of the solid are then measured, segmented like the photograph, and compared with it.
+/// Without PHOTO a built-in synthetic test image is used, so that `stereology synthesize -o out` shows every step.
 ///
-/// Writes into DIR: all files of `stereology segment`; densities.csv; packing.json; solid.json and texture.npy (the solid, opened again by slice, render and
-/// export); volume.npy (one period, u8 colours); cube.png; comparison.png (photograph beside a section at the same scale); summary.json; and report.html,
-/// which is the file to open first.
+/// Writes into DIR: all files of `stereology segment`; densities.csv; packing.json; solid.json and texture.npy (the solid, for slice, render, export and carve);
+/// volume.npy (one period, u8 colours); cube.png; comparison.png (the photograph beside a section at the same scale); summary.json; and report.html, which is
+/// the file to open first.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology synthesize photo.jpg -o out --shape rock:1 --scale 0.05")]
 pub struct Synthesize {
-    /// Photograph of a cut [default: the built-in sample]
+    /// Photograph of a plane section [default: the built-in sample]
     #[arg(value_name = "PHOTO")]
     pub photo: Option<PathBuf>,
     /// Folder for the results
@@ -56,29 +64,29 @@ pub struct Synthesize {
     pub solid: Solid,
     #[command(flatten)]
     pub texture: texture::Choices,
-    /// How the residual volume is made
+    /// How the residual volume is synthesised
     #[arg(long, value_enum, default_value_t = texture::Mode::Slices, help_heading = "Texture")]
     pub texture_mode: texture::Mode,
 }
 
-/// How large the solid is and how it is packed.
+/// Size and packing of the solid.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Solid")]
 #[group(id = "solid-choices")]
 pub struct Solid {
-    /// Side of the box that repeats [default: 4 x the largest particle, or more: enough for 5000 particles]
+    /// Side of the periodic box [default: 4 x the largest particle, or the side that holds 5000 particles if that is larger]
     #[arg(long = "box", value_name = "L", value_parser = positive, conflicts_with = "count")]
     pub side: Option<f64>,
     /// Number of particles, instead of --box
     #[arg(long, value_name = "N", value_parser = count)]
     pub count: Option<usize>,
-    /// Number of a --shape, from 0, whose particles are voids: pores, bubbles; may be repeated
+    /// Index, from 0, of a --shape whose particles are voids, such as pores and bubbles; may be repeated
     #[arg(long = "void", value_name = "K")]
     pub voids: Vec<usize>,
-    /// Fraction of the volume inside particles [default: the photograph's area fraction]
+    /// Fraction of the volume inside particles [default: the area fraction of the photograph]
     #[arg(long, value_name = "PHI", value_parser = share)]
     pub fraction: Option<f64>,
-    /// How overlaps are removed
+    /// Packing algorithm
     #[arg(long, value_enum, default_value_t = pack::Mode::Fast)]
     pub pack_mode: pack::Mode,
     /// Voxels of volume.npy along the box's longest side
@@ -89,24 +97,216 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
-/// More voxels along a side would take longer than the whole solid: a matter for `export`.
+/// Largest number of voxels along a side; more would take longer than the rest of the synthesis and are left to `export`.
 const MOST_VOXELS: usize = 2048;
-/// Ten bins leave steps in the profile sizes of the solid's sections; the report shows intervals.
+/// Ten bins would leave steps in the profile sizes of the solid's sections; the report shows confidence intervals.
 const DEFAULTS: Defaults = Defaults {
     bins: 16,
     replicates: Some(200),
 };
 /// White between photograph and section in comparison.png, in pixels.
 const GAP: u32 = 8;
-/// Normals of the sections that the report shows, and their offsets as fractions of the box's side: aslant, so that the solid's period does not show.
+/// Normals of the sections in the report, and their offsets as fractions of the box's side; oblique, so that the period is not visible.
 const SECTIONS: [([f64; 3], f64); 2] = [([1.0, 2.0, 3.0], 0.37), ([-3.0, 2.0, 1.5], 0.61)];
+
+/// JSON of `stereology synthesize`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SynthesizeFields {
+    /// The segmentation of the photograph.
+    segment: SegmentFields,
+    /// The particles per volume.
+    unfold: UnfoldedPhoto,
+    /// The packing.
+    pack: PackedPhoto,
+    /// The texture of binder and particles.
+    texture: TexturedPhoto,
+    /// Sections of the solid compared with the photograph.
+    verification: VerificationFields,
+    /// Whether the numbers and the appearance of the solid can be trusted.
+    verdict: VerdictFields,
+}
+
+/// Whether a solid can be trusted.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct VerdictFields {
+    /// Reliability of densities, sizes and fractions.
+    numbers: OpinionFields,
+    /// Similarity of sections of the solid to the photograph.
+    appearance: OpinionFields,
+    /// All checks.
+    checks: Vec<VerdictCheck>,
+}
+
+/// The worst level of several checks.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct OpinionFields {
+    /// good, care or bad.
+    #[schemars(with = "String")]
+    level: Level,
+    /// The check farthest beyond its limit.
+    #[schemars(with = "String")]
+    worst: CheckName,
+}
+
+/// A check of the solid.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct VerdictCheck {
+    /// What is examined.
+    #[schemars(with = "String")]
+    name: CheckName,
+    /// What was found; null if it is not a number.
+    value: Option<f64>,
+    /// Limit of the level good.
+    limit: f64,
+    /// good (within the limit), care or bad.
+    #[schemars(with = "String")]
+    level: Level,
+}
+
+impl VerdictFields {
+    fn of(verdict: &Verdict) -> Self {
+        let opinion = |of: Opinion| OpinionFields {
+            level: of.level,
+            worst: of.worst,
+        };
+        let check = |of: &Check| VerdictCheck {
+            name: of.name,
+            value: Some(of.value).filter(|value| value.is_finite()),
+            limit: of.limit,
+            level: of.level,
+        };
+        Self {
+            numbers: opinion(verdict.numbers),
+            appearance: opinion(verdict.appearance),
+            checks: verdict.checks.iter().map(check).collect(),
+        }
+    }
+}
+
+/// Particles per volume.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct UnfoldedPhoto {
+    #[serde(flatten)]
+    all: UnfoldingFields,
+    /// Probability of such an association of size and colour if they are independent; null if there is one colour category.
+    size_and_colour_p_value: Option<f64>,
+}
+
+/// The packing of a solid.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PackedPhoto {
+    /// Number of particles.
+    particles: usize,
+    /// Sides of the periodic box.
+    #[serde(rename = "box")]
+    sides: [f64; 3],
+    /// Fraction of the volume inside particles.
+    fraction: f64,
+    /// The fraction that was requested: the photograph's area fraction unless --fraction is given.
+    requested_fraction: f64,
+    /// The volume fraction of the unfolded densities.
+    unfolded_fraction: f64,
+    /// Factor from the unfolded densities to those of the packing.
+    density_factor: f64,
+    /// Largest penetration of two particles over the mean size, from a separate pass.
+    max_overlap: f64,
+    /// Whether no particles overlap.
+    certified: bool,
+    /// Iterations used.
+    iterations: usize,
+}
+
+/// The resynthesised residual texture.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TexturedPhoto {
+    /// Voxels along z, y and x.
+    shape: Vec<usize>,
+    /// How the volume was synthesised.
+    mode: &'static str,
+    /// Number of iterations.
+    iterations: usize,
+    /// Synthesis of the binder's texture; null if it was left plain.
+    binder: Option<Resynthesis>,
+    /// Synthesis of the particles' texture; null if it was left plain.
+    particles: Option<Resynthesis>,
+}
+
+/// A texture synthesis.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Resynthesis {
+    /// Number of pyramid levels.
+    levels: usize,
+    /// Error of the sub-band statistics before each iteration.
+    band_errors: Vec<f64>,
+    /// Error of the statistics of the sections after each iteration.
+    slice_errors: Vec<f64>,
+    /// Error of the statistics of the sections of the result.
+    final_error: f64,
+    /// Whether further iterations would change little.
+    settled: bool,
+}
+
+impl Resynthesis {
+    fn of(report: &TextureReport) -> Self {
+        Self {
+            levels: report.levels,
+            band_errors: report.band_errors.clone(),
+            slice_errors: report.slice_errors.clone(),
+            final_error: report.final_error,
+            settled: report.has_settled(),
+        }
+    }
+}
+
+/// Sections of the solid compared with the photograph.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct VerificationFields {
+    #[serde(flatten)]
+    exact: ComparisonFields,
+    /// The same for sections that were segmented like the photograph; null if there are none.
+    resegmented: Option<ComparisonFields>,
+}
+
+/// A comparison of sections with the photograph.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ComparisonFields {
+    /// Profiles on the photograph.
+    profiles_photo: usize,
+    /// Profiles on the sections.
+    profiles_synthetic: usize,
+    /// Wasserstein-1 distance of profile sizes over their mean.
+    size_w1: f64,
+    /// Fraction of the photograph inside profiles.
+    area_fraction_photo: f64,
+    /// Fraction of the sections inside profiles.
+    area_fraction_synthetic: f64,
+    /// Wasserstein-1 distance of colours, encoded, 0 to 1.
+    colour_distance: f64,
+}
+
+impl ComparisonFields {
+    fn of(of: &Comparison) -> Self {
+        Self {
+            profiles_photo: of.profiles_photo,
+            profiles_synthetic: of.profiles_synthetic,
+            size_w1: of.size_w1,
+            area_fraction_photo: of.area_fraction_photo,
+            area_fraction_synthetic: of.area_fraction_synthetic,
+            colour_distance: of.colour_distance,
+        }
+    }
+}
+
+impl Fields for SynthesizeFields {
+    const COMMAND: &'static str = "synthesize";
+}
 
 impl Synthesize {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let options = self.options(everywhere)?;
         if self.solid.voxels > MOST_VOXELS {
             return Err(Failure::run(format!(
-                "--voxels {}: volume.npy would need {:.1e} bytes; ask for at most {MOST_VOXELS}, or export a finished solid",
+                "--voxels {}: volume.npy would need {:.1e} bytes; give at most {MOST_VOXELS}, or use `stereology export` on the finished solid",
                 self.solid.voxels,
                 3.0 * (self.solid.voxels as f64).powi(3)
             )));
@@ -117,7 +317,7 @@ impl Synthesize {
         let shapes = types.types().len();
         if let Some(none) = self.solid.voids.iter().find(|&&k| k >= shapes) {
             return Err(Failure::usage(format!(
-                "--void {none}: there are {shapes} shapes, counted from 0"
+                "--void {none}: the shapes are numbered from 0, and there are {shapes}"
             )));
         }
         let labels = self
@@ -133,9 +333,11 @@ impl Synthesize {
         })
         .map_err(|error| self.failure(error))?;
         go_on()?;
-        let mut answer = self.answer(&synthesis);
+        let mut answer = self.answer(&synthesis)?;
         for finding in noticed {
-            answer.warn(crate::warnings::Warning::new(finding.code, finding.message));
+            answer
+                .notes
+                .warn(crate::warnings::Warning::new(finding.code, finding.message));
         }
         self.write(&folder, &synthesis, &types, &name, everywhere, &stages)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
@@ -146,8 +348,10 @@ impl Synthesize {
             .into_iter()
             .map(|(step, seconds)| (step.to_owned(), json!(seconds)))
             .collect();
-        answer.seconds(seconds);
-        answer.line(format!("open {}", self.output.join("report.html").display()));
+        answer.notes.seconds(seconds);
+        answer
+            .notes
+            .line(format!("open {}", self.output.join("report.html").display()));
         Ok(answer)
     }
 
@@ -205,7 +409,7 @@ impl Synthesize {
     fn failure(&self, error: SynthesisError) -> Failure {
         match error {
             SynthesisError::Pack(error) => pack_failure(error),
-            // What was wrong with the photograph or its labels: they are named.
+            // The photograph or its labels are unsuitable: name the file.
             SynthesisError::Segment(error) => match self.segment.labels.as_ref().or(self.photo.as_ref()) {
                 Some(path) => Failure::run(format!("{}: {error}", path.display())),
                 None => Failure::run(error),
@@ -215,87 +419,46 @@ impl Synthesize {
         }
     }
 
-    fn answer(&self, synthesis: &Synthesis) -> Answer {
-        let object = |fields: Vec<(&'static str, Value)>| -> Value {
-            Value::Object(
-                fields
-                    .into_iter()
-                    .map(|(name, value)| (name.to_owned(), value))
-                    .collect(),
-            )
-        };
-        let figures = |of: &Comparison| {
-            vec![
-                ("profiles_photo", json!(of.profiles_photo)),
-                ("profiles_synthetic", json!(of.profiles_synthetic)),
-                ("size_w1", json!(of.size_w1)),
-                ("area_fraction_photo", json!(of.area_fraction_photo)),
-                ("area_fraction_synthetic", json!(of.area_fraction_synthetic)),
-                ("colour_distance", json!(of.colour_distance)),
-            ]
-        };
+    fn answer(&self, synthesis: &Synthesis) -> Result<Answer, Failure> {
         let (packing, population, verification) = (&synthesis.packing, &synthesis.population, &synthesis.verification);
-        let mut compared = figures(&verification.exact);
-        compared.push((
-            "resegmented",
-            verification
-                .resegmented
-                .as_ref()
-                .map_or(Value::Null, |again| object(figures(again))),
-        ));
-        let report = |of: &Option<TextureReport>| {
-            of.as_ref().map_or(
-                Value::Null,
-                |of| {
-                    json!({
-                        "levels": of.levels, "band_errors": of.band_errors, "slice_errors": of.slice_errors, "final_error": of.final_error,
-                        "settled": of.has_settled(),
-                    })
-                },
-            )
-        };
         let pixel = synthesis.details.residual.voxel;
         let sides: [f64; 3] = packing.sides().into();
-        let mut unfolded = unfold::figures(&synthesis.densities.all, self.unfold.kernel_name());
-        unfolded.push((
-            "size_and_colour_p_value",
-            json!(synthesis.densities.association.p_value),
-        ));
-        let mut answer = Answer::new("synthesize");
-        answer
-            .field("segment", object(segment::figures(&synthesis.segmentation, pixel)))
-            .field("unfold", object(unfolded))
-            .field(
-                "pack",
-                json!({
-                    "particles": packing.particles().len(),
-                    "box": sides,
-                    "fraction": packing.fraction(),
-                    "requested_fraction": population.fraction,
-                    "unfolded_fraction": population.unfolded_fraction,
-                    "density_factor": population.density_factor,
-                    "max_overlap": packing.max_overlap(),
-                    "certified": packing.max_overlap() <= 0.0,
-                    "iterations": packing.iterations(),
-                }),
-            )
-            .field(
-                "texture",
-                json!({
-                    "shape": synthesis.details.residual.binder.shape()[..3].to_vec(),
-                    "mode": self.texture_mode.name(),
-                    "iterations": self.texture.iterations,
-                    "binder": report(&synthesis.details.binder),
-                    "particles": report(&synthesis.details.particles),
-                }),
-            )
-            .field("verification", object(compared))
-            .field("verdict", json!(synthesis.verdict));
+        let fields = SynthesizeFields {
+            segment: SegmentFields::of(&synthesis.segmentation, pixel),
+            unfold: UnfoldedPhoto {
+                all: UnfoldingFields::of(&synthesis.densities.all, self.unfold.kernel_name()),
+                size_and_colour_p_value: Some(synthesis.densities.association.p_value).filter(|p| p.is_finite()),
+            },
+            pack: PackedPhoto {
+                particles: packing.particles().len(),
+                sides,
+                fraction: packing.fraction(),
+                requested_fraction: population.fraction,
+                unfolded_fraction: population.unfolded_fraction,
+                density_factor: population.density_factor,
+                max_overlap: packing.max_overlap(),
+                certified: packing.max_overlap() <= 0.0,
+                iterations: packing.iterations(),
+            },
+            texture: TexturedPhoto {
+                shape: synthesis.details.residual.binder.shape()[..3].to_vec(),
+                mode: self.texture_mode.name(),
+                iterations: self.texture.iterations,
+                binder: synthesis.details.binder.as_ref().map(Resynthesis::of),
+                particles: synthesis.details.particles.as_ref().map(Resynthesis::of),
+            },
+            verification: VerificationFields {
+                exact: ComparisonFields::of(&verification.exact),
+                resegmented: verification.resegmented.as_ref().map(ComparisonFields::of),
+            },
+            verdict: VerdictFields::of(&synthesis.verdict),
+        };
+        let mut notes = Notes::default();
         for warning in &synthesis.findings {
-            answer.warn(warning.clone());
+            notes.warn(warning.clone());
         }
         let exact = &verification.exact;
-        answer
+        notes
             .line(format!(
                 "{} profiles, {} of the area",
                 exact.profiles_photo,
@@ -308,11 +471,11 @@ impl Synthesize {
                 percent(packing.fraction())
             ))
             .line(format!(
-                "sections of the solid: area fraction {}, profile sizes apart by {} of their mean",
+                "sections of the solid: area fraction {}, profile sizes differ by {} of their mean",
                 percent(exact.area_fraction_synthetic),
                 percent(exact.size_w1)
             ));
-        answer
+        Answer::new(&fields, notes)
     }
 
     fn write(
@@ -347,14 +510,24 @@ impl Synthesize {
                 &beside(synthesis.segmentation.photo(), section),
             )?;
         }
-        let input = report_input(synthesis, types, pictures, name, &everywhere.invocation);
-        write_text(&folder.file("report.html"), &report::page(&input))
+        let remarks = synthesis.findings.iter().map(|warning| Remark {
+            code: warning.code.to_owned(),
+            message: warning.message.clone(),
+            advice: advice(warning.code).map(str::to_owned),
+        });
+        let invocation = Invocation {
+            photo_name: name.to_owned(),
+            command: everywhere.invocation.command.clone(),
+            parameters: everywhere.invocation.parameters.clone(),
+        };
+        let report = SynthesisReport::new(synthesis, types, pictures, invocation, remarks.collect());
+        write_text(&folder.file("report.html"), &synthesis_page(&report).or_fail()?)
     }
 
-    fn pictures(&self, synthesis: &Synthesis, pixel: f64) -> Result<Pictures, Failure> {
+    fn pictures(&self, synthesis: &Synthesis, pixel: f64) -> Result<SolidImages, Failure> {
         let solid = &synthesis.solid;
         let (width, height) = synthesis.segmentation.photo().dimensions();
-        let mut pictures = Pictures {
+        let mut pictures = SolidImages {
             cube: cube(solid)?,
             sections: Vec::new(),
         };
@@ -387,7 +560,7 @@ fn cube(solid: &stereology::volume::Solid) -> Result<RgbImage, Failure> {
     .or_fail()
 }
 
-/// Two pictures of one height side by side.
+/// Two images side by side.
 fn beside(left: &RgbImage, right: &RgbImage) -> RgbImage {
     let height = left.height().max(right.height());
     let mut both = RgbImage::from_pixel(left.width() + GAP + right.width(), height, Rgb([255; 3]));

@@ -8,6 +8,8 @@ use clap::{Args, ValueEnum};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use ndarray::{Array3, Axis};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
 use stereology::pyramid::{
     self, Exemplar, TextureOptions, TextureReport, synthesize_image_with_report, synthesize_oriented_volume,
@@ -15,39 +17,40 @@ use stereology::pyramid::{
 };
 use stereology::segment::read_photo;
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_file;
 use crate::progress::{Step, go_on, stopped};
 use crate::values::{Extent, count};
 use crate::warnings::Warning;
 
-/// Makes a picture or a volume with the texture of a picture, of any size, that repeats without a seam
+/// Synthesises a periodic texture image or volume from an example image
 ///
-/// Heeger-Bergen synthesis with a steerable pyramid. --size N or NZ,NY,NX makes a volume every slice of which looks like IMAGE; H,W makes a picture. Good for
-/// textures without large forms (stone, sand, paste); particles are the business of `stereology synthesize`.
+/// Heeger-Bergen synthesis with a steerable pyramid. --size N or NZ,NY,NX gives a volume whose slices all look like IMAGE; --size H,W gives an image. The result
+/// has any size and repeats without a seam. The method suits textures without large structures (stone, sand, paste); for materials with particles use
+/// `stereology synthesize`.
 ///
-/// Two or three pictures make a volume that looks different along its axes (--mode oriented): the first shows the slices normal to z (rows along y,
-/// columns along x), the second those normal to y (rows along z, columns along x), the third those normal to x (rows along z, columns along y); of two, the
-/// second stands for y and x. They must be at the same scale.
+/// Two or three images give a volume that looks different along its axes (--mode oriented): the first shows slices normal to z (rows along y, columns along
+/// x), the second slices normal to y (rows along z, columns along x), the third slices normal to x (rows along z, columns along y). If there are two, the
+/// second is used for y and x. All images must have the same scale.
 ///
-/// Writes u8 colours: .png (picture), .npy, .nrrd, .vti or .tif (volume).
+/// Writes u8 colours: .png (image), .npy, .nrrd, .vti, .tif, .h5 or .zarr (volume).
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology texture granite.png --size 128 -o granite.npy")]
 pub struct Texture {
-    /// Picture of the texture; or two or three, one an axis: normal to z, y, x
+    /// Example of the texture; or two or three, one per axis: normal to z, y, x
     #[arg(value_name = "IMAGE", required = true, num_args = 1..=3)]
     pub images: Vec<PathBuf>,
-    /// Samples: N or NZ,NY,NX (volume), H,W (picture)
+    /// Size of the result in samples: N or NZ,NY,NX (volume), H,W (image)
     #[arg(long, value_name = "N[,N[,N]]")]
     pub size: Extent,
     #[command(flatten)]
     pub choices: Choices,
-    /// How a volume is made [default: slices; oriented for two or three pictures]
+    /// How a volume is synthesised [default: slices; oriented for two or three images]
     #[arg(long, value_enum)]
     pub mode: Option<Mode>,
-    /// File for the result; its ending tells the format
+    /// File to write; its extension selects the format
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 }
@@ -57,71 +60,71 @@ pub struct Texture {
 #[command(next_help_heading = "Texture")]
 #[group(id = "texture-choices")]
 pub struct Choices {
-    /// Rounds of matching
+    /// Number of iterations
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count)]
     pub iterations: usize,
-    /// Levels of the pyramid [default: by size]
+    /// Number of pyramid levels [default: depends on the size]
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
-    /// Orientations of the pyramid
+    /// Number of orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
-    /// Which cuts of a volume of mode `slices` look like the picture
+    /// Which sections of a volume match the image, with mode slices
     #[arg(long, value_enum, default_value_t = Cuts::All)]
     pub cuts: Cuts,
-    /// How values are given another distribution
+    /// How histograms are matched
     #[arg(long, value_enum, default_value_t = Matching::Table)]
     pub matching: Matching,
-    /// How the picture's borders are kept out of its statistics
+    /// How the borders of the image are kept out of its statistics
     #[arg(long, value_enum, default_value_t = Edges::PeriodicComponent)]
     pub borders: Edges,
 }
 
-/// Which cuts look like the picture.
+/// Which sections match the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Cuts {
-    /// Cuts in all directions
+    /// Sections in all directions
     All,
-    /// Slices along the axes: a third faster
+    /// Slices along the axes: faster by a third
     Axes,
 }
 
-/// How values are given another distribution.
+/// How histograms are matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Matching {
-    /// By a table of 4096 bins: fast
+    /// With a table of 4096 bins: fast
     Table,
     /// By rank: exact
     Exact,
 }
 
-/// How the picture's borders are kept out of its statistics.
+/// How the borders of the image are kept out of its statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Edges {
-    /// The picture's periodic component
+    /// Use the periodic component of the image
     PeriodicComponent,
-    /// The picture and its mirror images
+    /// Use the image and its mirror images
     Mirror,
-    /// Not at all: for pictures that repeat without a seam
+    /// No treatment: for images that repeat without a seam
     Wrap,
 }
 
-/// How a volume is made.
+/// How a volume is synthesised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
-    /// Every slice of the three axes matches the picture
+    /// Every slice along the three axes matches the image
     Slices,
-    /// Every slice matches the picture in each direction of its own too; one picture an axis, if given
+    /// Every slice also matches the image in each of its own directions; accepts one image per axis
     Oriented,
-    /// The spectrum a slice should show, and corrected band variances: faster
+    /// Matches the spectrum of slices and corrects sub-band variances: faster
     Spectrum,
-    /// The plain method of 1995 and 2004 in three dimensions, whose slices lose contrast
+    /// The method of 1995 and 2004 in three dimensions, whose slices lose contrast
     Volume,
 }
 
 impl Mode {
-    /// How the volume is made.
-    pub fn way(self) -> pyramid::Mode {
+    /// The mode of the library.
+    pub fn mode(self) -> pyramid::Mode {
         match self {
             Self::Slices => pyramid::Mode::Slices,
             Self::Oriented => pyramid::Mode::Oriented,
@@ -130,7 +133,7 @@ impl Mode {
         }
     }
 
-    /// Its name.
+    /// Name of the mode.
     pub fn name(self) -> &'static str {
         match self {
             Self::Slices => "slices",
@@ -145,7 +148,7 @@ impl Choices {
     /// The options of the synthesis.
     pub fn options(&self, mode: Mode, seed: u64) -> TextureOptions {
         let options = TextureOptions::default()
-            .with_mode(mode.way())
+            .with_mode(mode.mode())
             .with_iterations(self.iterations)
             .with_orientations(self.orientations)
             .with_cuts(match self.cuts {
@@ -169,10 +172,37 @@ impl Choices {
     }
 }
 
-/// What is made.
+/// What is synthesised.
 enum Target {
     Picture([usize; 2]),
     Volume([usize; 3], Format),
+}
+
+/// JSON of `stereology texture`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TextureFields {
+    /// Samples along each axis, and channels.
+    shape: Vec<usize>,
+    /// How the volume was synthesised.
+    mode: &'static str,
+    /// Number of iterations.
+    iterations: usize,
+    /// Number of pyramid levels.
+    levels: usize,
+    /// Number of orientations of the pyramid.
+    orientations: usize,
+    /// Whether further iterations would change little.
+    settled: bool,
+    /// Error of the statistics of the sections of the result.
+    final_error: f64,
+    /// Error of the sub-band statistics before each iteration.
+    band_errors: Vec<f64>,
+    /// Error of the statistics of the sections after each iteration; empty for images.
+    slice_errors: Vec<f64>,
+}
+
+impl Fields for TextureFields {
+    const COMMAND: &'static str = "texture";
 }
 
 impl Texture {
@@ -181,7 +211,7 @@ impl Texture {
         let mode = self.mode.unwrap_or(if several { Mode::Oriented } else { Mode::Slices });
         if several && mode != Mode::Oriented {
             return Err(Failure::usage(format!(
-                "--mode {} takes one picture: several are for --mode oriented",
+                "--mode {} takes one image; several images need --mode oriented",
                 mode.name()
             )));
         }
@@ -189,7 +219,7 @@ impl Texture {
         let target = self.target()?;
         if several && matches!(target, Target::Picture(_)) {
             return Err(Failure::usage(
-                "a picture is made from one picture, a volume from up to three",
+                "an image is synthesised from one image, a volume from up to three",
             ));
         }
         check_file(&self.output, everywhere.force)?;
@@ -203,11 +233,11 @@ impl Texture {
         let samples: Vec<Array3<f32>> = pictures.iter().map(|picture| samples(picture, channels)).collect();
         let exemplars: Vec<Exemplar<'_>> = samples.iter().map(|samples| Exemplar::new(samples.view())).collect();
         let step = Step::begin("texture", everywhere.quiet);
-        let said = AtomicUsize::new(0);
+        let shown = AtomicUsize::new(0);
         let watch = |done: f64, report: &TextureReport| {
-            let rounds = report.band_errors.len();
-            if said.swap(rounds, Ordering::Relaxed) < rounds {
-                step.say(&round_told(report));
+            let iterations = report.band_errors.len();
+            if shown.swap(iterations, Ordering::Relaxed) < iterations {
+                step.print(&last_iteration(report));
             }
             step.at(done)
         };
@@ -245,49 +275,50 @@ impl Texture {
                 (made.shape().to_vec(), report)
             }
         };
-        let mut answer = Answer::new("texture");
-        answer
+        let mut notes = Notes::default();
+        notes
             .line(format!(
                 "{} samples written to {}",
                 shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
                 self.output.display()
             ))
             .line(format!(
-                "mode {}, {} rounds, {} levels",
+                "mode {}, {} iterations, {} levels",
                 mode.name(),
                 self.choices.iterations,
                 report.levels
             ))
             .line(format!(
-                "bands off by, before each round: {}",
+                "error of the sub-band statistics before each iteration: {}",
                 listed(&report.band_errors)
             ));
         if !report.slice_errors.is_empty() {
-            answer.line(format!(
-                "cuts off by, after each round: {}; at the end: {:.4}",
+            notes.line(format!(
+                "error of the section statistics after each iteration: {}; at the end: {:.4}",
                 listed(&report.slice_errors),
                 report.final_error
             ));
         }
-        answer.line(if report.has_settled() {
-            "settled: more rounds would change little"
+        notes.line(if report.has_settled() {
+            "converged: further iterations would change little"
         } else {
-            "not settled: more --iterations may bring the bands nearer"
+            "not converged: more --iterations may reduce the error of the sub-band statistics"
         });
-        answer
-            .field("shape", shape)
-            .field("mode", mode.name())
-            .field("iterations", self.choices.iterations)
-            .field("levels", report.levels)
-            .field("orientations", self.choices.orientations)
-            .field("settled", report.has_settled())
-            .field("final_error", report.final_error)
-            .field("band_errors", report.band_errors)
-            .field("slice_errors", report.slice_errors);
         for finding in &report.findings {
-            answer.warn(Warning::new(finding.code, finding.message.clone()));
+            notes.warn(Warning::new(finding.code, finding.message.clone()));
         }
-        Ok(answer)
+        let fields = TextureFields {
+            shape,
+            mode: mode.name(),
+            iterations: self.choices.iterations,
+            levels: report.levels,
+            orientations: self.choices.orientations,
+            settled: report.has_settled(),
+            final_error: report.final_error,
+            band_errors: report.band_errors,
+            slice_errors: report.slice_errors,
+        };
+        Answer::new(&fields, notes)
     }
 
     fn target(&self) -> Result<Target, Failure> {
@@ -297,7 +328,7 @@ impl Texture {
             .is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
         let wrong = |what: &str| {
             Err(Failure::usage(format!(
-                "--size and -o {} do not fit: {what}",
+                "--size does not fit -o {}: {what}",
                 self.output.display()
             )))
         };
@@ -309,22 +340,24 @@ impl Texture {
                 [nz, ny, nx],
                 Format::from_path(&self.output).or_usage("-o")?,
             )),
-            (&[_, _], false) => wrong("H,W makes a picture, so the file must end in .png"),
-            _ => wrong("NZ,NY,NX makes a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),
+            (&[_, _], false) => wrong("H,W gives an image, so the file must end in .png"),
+            _ => wrong("NZ,NY,NX gives a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),
         }
     }
 }
 
-/// The last round, for people who watch.
-fn round_told(report: &TextureReport) -> String {
-    let rounds = report.band_errors.len();
+/// Errors of the last iteration, shown with the progress.
+fn last_iteration(report: &TextureReport) -> String {
+    let iterations = report.band_errors.len();
     let before = report.band_errors.last().copied().unwrap_or_default();
     let after = report.slice_errors.last();
-    let after = after.map_or(String::new(), |error| format!(", cuts off by {error:.4} after it"));
-    format!("texture round {rounds}: bands off by {before:.4} before it{after}")
+    let after = after.map_or(String::new(), |error| {
+        format!(", of the section statistics after it {error:.4}")
+    });
+    format!("iteration {iterations}: error of the sub-band statistics before it {before:.4}{after}")
 }
 
-/// Errors for people.
+/// A list of errors as text.
 fn listed(errors: &[f64]) -> String {
     let words: Vec<String> = errors.iter().map(|error| format!("{error:.4}")).collect();
     words.join(" ")
@@ -336,7 +369,7 @@ fn is_grey(picture: &RgbImage) -> bool {
         .all(|pixel| pixel.0[0] == pixel.0[1] && pixel.0[1] == pixel.0[2])
 }
 
-/// Values 0 to 1 of a picture (y, x, channel).
+/// Values 0 to 1 of an image (y, x, channel).
 fn samples(picture: &RgbImage, channels: usize) -> Array3<f32> {
     Array3::from_shape_fn(
         (picture.height() as usize, picture.width() as usize, channels),

@@ -23,6 +23,7 @@ fn help_teaches() {
         "contact",
         "displace",
         "explore",
+        "schema",
     ] {
         let (code, out, _) = stereology(&[command, "--help"]);
         assert_eq!(code, 0);

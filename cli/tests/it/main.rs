@@ -7,6 +7,7 @@ mod contract;
 mod exemplars;
 mod packings;
 mod reliefs;
+mod schemas;
 mod small_commands;
 mod solid;
 mod stones;

@@ -1,4 +1,4 @@
-//! What is given beside the pictures: voxels and a mask.
+//! Inputs besides the images: fixed voxels and a mask.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use stereology::files::voxel_table::{self, ValueRange, ValueRow};
 use stereology::grid::read_volume;
 use stereology::grow::Voxels;
 
-use crate::answer::Answer;
+use crate::answer::Notes;
 use crate::commands::grow::closed_mesh;
 use crate::failure::{Explain, Failure};
 use crate::warnings::Warning;
@@ -16,7 +16,7 @@ use crate::warnings::Warning;
 /// Largest side of a solid, in voxels.
 const MOST: usize = 65_536;
 
-/// Voxels from rows of x, y, z and `channels` values of 0 to 255, which are divided by `scale`.
+/// Reads voxels from rows of x, y, z and `channels` values from 0 to 255, which are divided by `scale`.
 pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel>, Failure> {
     let voxel = |row: ValueRow| {
         let Some([z, y, x]) = row.voxel([MOST; 3]) else {
@@ -36,8 +36,8 @@ pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel
         .collect()
 }
 
-/// The mask: an array of the solid's size, or a mesh as large as fits into it, in its middle.
-pub fn mask(path: &Path, size: [usize; 3], answer: &mut Answer) -> Result<Array3<bool>, Failure> {
+/// Reads the mask: an array of the solid's size, or a mesh that is scaled to fit the box and centred.
+pub fn mask(path: &Path, size: [usize; 3], notes: &mut Notes) -> Result<Array3<bool>, Failure> {
     if path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
@@ -47,7 +47,7 @@ pub fn mask(path: &Path, size: [usize; 3], answer: &mut Answer) -> Result<Array3
     }
     let mesh = closed_mesh(&path.to_string_lossy())?;
     for repair in mesh.repairs() {
-        answer.warn(Warning::new("mesh-repaired", repair.to_string()));
+        notes.warn(Warning::new("mesh-repaired", repair.to_string()));
     }
     let (low, high) = mesh
         .as_triangle_mesh()

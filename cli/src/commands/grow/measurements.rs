@@ -1,4 +1,4 @@
-//! Measurements from a CSV file: places and values.
+//! Measurements from a CSV file: positions and values.
 
 use std::path::Path;
 
@@ -10,27 +10,27 @@ use stereology::grow::Voxels;
 use crate::failure::{Explain, Failure};
 use crate::warnings::Warning;
 
-/// What x, y, z are.
+/// Unit of the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Unit {
-    /// Mesh units; if that does not fit but numbers of voxels do, those, with a warning
+    /// Units of the mesh; if those do not fit, voxel indices, with a warning
     Auto,
-    /// Mesh units
+    /// Units of the mesh
     Mesh,
-    /// Numbers of voxels from 0
+    /// Voxel indices from 0
     Voxels,
 }
 
-/// Measured voxels (z, y, x) with their values, and what was noticed.
+/// Measured voxels (z, y, x) with their values, and warnings.
 pub struct Measurements {
     pub voxels: Vec<([usize; 3], Vec<f32>)>,
     pub warnings: Vec<Warning>,
 }
 
-/// Farthest a point of the surface may be from the centre of a voxel inside, voxels: a diagonal.
+/// Largest distance in voxels from a point of the surface to the centre of a voxel inside: a diagonal.
 const REACH: f64 = 1.75;
 
-/// Reads rows of x, y, z and a value in `range` for each of `channels`.
+/// Reads rows of x, y, z and one value in `range` for each of `channels`.
 pub fn read(
     path: &Path,
     unit: Unit,
@@ -49,7 +49,7 @@ pub fn read(
                 let mut found = in_voxels(path, &rows, voxels).map_err(|_| error)?;
                 found.warnings.push(Warning::new(
                     "measured-as-voxels",
-                    format!("x, y, z of {} were taken as numbers of voxels", path.display()),
+                    format!("x, y, z in {} were taken as voxel indices", path.display()),
                 ));
                 found
             }
@@ -67,13 +67,13 @@ fn in_mesh(path: &Path, rows: &[ValueRow], voxels: &Voxels) -> Result<Measuremen
         moved += usize::from(own.is_none());
         let voxel = own.or_else(near).ok_or_else(|| {
             Failure::run(format!(
-                "{}, line {}: ({}, {}, {}) lies outside the mesh, farther than a voxel of {}; correct its place, or say --measured-in voxels",
+                "{}, line {}: ({}, {}, {}) lies more than one voxel ({}) outside the mesh; correct its position, or give --measured-in voxels",
                 path.display(),
                 row.line,
                 row.place[0],
                 row.place[1],
                 row.place[2],
-                crate::numbers::significant(voxels.spacing)
+                stereology_report::significant(voxels.spacing)
             ))
         })?;
         found.push((voxel, row.values.clone()));
@@ -100,7 +100,7 @@ fn in_voxels(path: &Path, rows: &[ValueRow], voxels: &Voxels) -> Result<Measurem
     let found = rows.iter().map(|row| {
         voxel(row).ok_or_else(|| {
             Failure::run(format!(
-                "{}, line {}: ({}, {}, {}) is no voxel inside the mesh, of {nx} x {ny} x {nz}; remove it, or correct its place",
+                "{}, line {}: ({}, {}, {}) is not a voxel inside the mesh, whose box has {nx} x {ny} x {nz} voxels; remove it, or correct its position",
                 path.display(),
                 row.line,
                 row.place[0],

@@ -1,4 +1,4 @@
-//! How to unfold: the options that `unfold` and `synthesize` share.
+//! Options of the unfolding, shared by `unfold` and `synthesize`.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use stereology::unfold::{self, Bootstrap, Resampling, UnfoldOptions};
 use crate::failure::{Explain, Failure, body};
 use crate::values::{BinCount, CappingAngle, Edges, MaxSize, ShapeShare, count, positive, share, shares};
 
-/// What a command takes if it is not told.
+/// Defaults that depend on the command.
 #[derive(Clone, Copy, Debug)]
 pub struct Defaults {
     /// Size bins.
@@ -26,40 +26,40 @@ pub struct Defaults {
 #[command(next_help_heading = "Unfolding")]
 #[group(id = "unfold-choices")]
 pub struct Choices {
-    /// Number of size bins between 0 and the largest size; auto: the most that hold five profiles each, and no more than 2 n^(1/3) [default: 10; 16 for synthesize, whose sections show the steps of coarser bins]
+    /// Number of size bins between 0 and the largest size; auto: as many as hold five profiles each, at most 2 n^(1/3) for n profiles [default: 10; 16 for synthesize, because sections of the solid show the steps of coarser bins]
     #[arg(long, value_name = "N|auto", conflicts_with = "edges")]
     pub bins: Option<BinCount>,
     /// Edges of the size bins, instead of --bins
     #[arg(long, value_name = "a,b,...")]
     pub edges: Option<Edges>,
-    /// Bins of equal width, of equal ratio, or Krumbein's half phi classes (sizes 2^(k/2) of the unit)
+    /// Spacing of the size bins
     #[arg(long, value_enum, default_value_t = Spacing::Equal, conflicts_with = "edges")]
     pub spacing: Spacing,
-    /// Shape of the particles and its share of them; may be repeated [default: sphere]
+    /// Shape of the particles, and its fraction of their number; may be repeated [default: sphere]
     #[arg(long, value_name = "SHAPE[=F]")]
     pub shape: Vec<ShapeShare>,
-    /// Largest particle size; or `corrected`, the largest profile and what it falls short of; or `likelihood` [default: `profile`, the largest profile]
+    /// Largest particle size: a length, `profile` (size of the largest profile), `corrected` (the same, corrected for its bias) or `likelihood` (most likely size) [default: profile]
     #[arg(long, value_name = "D", conflicts_with = "edges")]
     pub max_size: Option<MaxSize>,
-    /// Profiles up to this size are not observed: nothing is said about particles below it
+    /// Detection limit: smaller profiles are ignored and smaller particles are not estimated
     #[arg(long, value_name = "T", value_parser = positive)]
     pub min_size: Option<f64>,
-    /// Particles of size D show no profile below D sin of this angle in degrees (Keiding & Jensen's capping angle); fit: the most likely angle
+    /// Capping angle in degrees (Keiding and Jensen): a particle of size D shows no profile smaller than D times the sine of this angle; fit: the most likely angle
     #[arg(long, value_name = "DEGREES|fit")]
     pub capping_angle: Option<CappingAngle>,
-    /// How to solve
+    /// Method of estimation
     #[arg(long, value_enum, default_value_t = Method::Auto)]
     pub method: Method,
-    /// Sizes spread over each bin, or all at its upper edge (the paper's) [default: integrated; with --method paper: upper-edge]
+    /// Position of particle sizes within their bin [default: integrated; with --method paper: upper-edge]
     #[arg(long, value_enum)]
     pub kernel: Option<Kernel>,
-    /// Bootstrap replicates for intervals [default: none; synthesize: 200]
+    /// Number of bootstrap replicates for confidence intervals [default: none; synthesize: 200]
     #[arg(long, value_name = "B", value_parser = count)]
     pub bootstrap: Option<usize>,
-    /// What the bootstrap draws again: counts, or whole slices (column `slice`) where profiles of a slice go together
+    /// What the bootstrap resamples
     #[arg(long, value_enum, default_value_t = Resample::Counts)]
     pub resample: Resample,
-    /// Nominal coverage of the intervals
+    /// Nominal coverage of the confidence intervals
     #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = share)]
     pub level: f64,
 }
@@ -71,44 +71,44 @@ pub enum Spacing {
     Equal,
     /// Equal ratios
     Geometric,
-    /// Half phi: edges at powers of √2, whatever --bins
+    /// Krumbein's half-phi classes: edges at powers of √2 of the unit; --bins has no effect
     Phi,
 }
 
-/// What a bootstrap draws again.
+/// What a bootstrap resamples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Resample {
-    /// Poisson counts with the means of the fit
+    /// Counts: Poisson numbers with the means of the fit
     Counts,
-    /// Slices, with repetition
+    /// Whole slices (column `slice`), for profiles that are correlated within a slice
     Slices,
 }
 
-/// How the densities are found.
+/// How the densities are estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Method {
-    /// Chosen from the data: penalised, or sparse where its evidence is far greater
+    /// Selected from the data: penalised, or sparse if its evidence is much greater
     Auto,
-    /// Penalised likelihood: as smooth as the counts say
+    /// Penalised likelihood, with the smoothness that the counts support
     Penalised,
-    /// Likelihood on as few size bins as the counts bear
+    /// Maximum likelihood with as few size bins as the counts support
     Sparse,
-    /// Expectation maximisation: positive by construction
+    /// Expectation maximisation; densities are positive by construction
     Em,
-    /// Expectation maximisation with a little smoothing
+    /// Expectation maximisation with slight smoothing
     Ems,
-    /// Least squares with densities not below zero
+    /// Non-negative least squares
     Nnls,
-    /// The paper's inverse of K; negative densities are set to zero and counted
+    /// Inverse of K, as in the paper; negative densities are set to zero and counted
     Paper,
 }
 
-/// Where in its bin a particle's size lies.
+/// Position of particle sizes within their bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Kernel {
-    /// Anywhere in the bin
+    /// Uniformly distributed over the bin
     Integrated,
-    /// At the bin's upper edge
+    /// At the upper edge of the bin, as in the paper
     UpperEdge,
 }
 
@@ -128,7 +128,7 @@ impl Method {
 }
 
 impl Choices {
-    /// Where in its bin a particle's size lies.
+    /// Position of particle sizes within their bin.
     pub fn sizes(&self) -> Sizes {
         match (self.kernel, self.method) {
             (Some(Kernel::UpperEdge), _) | (None, Method::Paper) => Sizes::UpperEdge,
@@ -144,12 +144,12 @@ impl Choices {
         }
     }
 
-    /// The particle types; spheres if none are named.
+    /// The particle types; spheres by default.
     pub fn types(&self) -> Result<ParticleTypes, Failure> {
         types(&self.shape)
     }
 
-    /// All of them but the types; `defaults` where neither bins nor replicates are given. Lengths of the options are multiplied by `scale`.
+    /// All options except the types. Lengths are multiplied by `scale`.
     pub fn density_options(&self, scale: f64, seed: u64, defaults: &Defaults) -> DensityOptions {
         DensityOptions {
             bins: match self.bins {
@@ -188,7 +188,7 @@ impl Choices {
         }
     }
 
-    /// The largest size, lengths multiplied by `scale`.
+    /// The largest size; lengths are multiplied by `scale`.
     fn largest(&self, scale: f64) -> LargestSize {
         match self.max_size {
             None | Some(MaxSize::Profile) => LargestSize::Profile,
@@ -198,7 +198,7 @@ impl Choices {
         }
     }
 
-    /// What is lost at the rims.
+    /// The capping angle.
     fn capping(&self) -> Capping {
         match self.capping_angle {
             None => Capping::None,
@@ -224,7 +224,7 @@ pub fn types(shapes: &[ShapeShare]) -> Result<ParticleTypes, Failure> {
     ParticleTypes::new(bodies).or_fail()
 }
 
-/// Outputs hold no paths: a mesh file goes by its name.
+/// Outputs contain no folders, so a mesh file is identified by its name.
 fn file_name(shape: &str) -> String {
     Path::new(shape)
         .file_name()

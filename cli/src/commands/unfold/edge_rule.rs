@@ -1,4 +1,4 @@
-//! `--edge-rule`: how much a profile counts at the edge of its slice, from what the table tells of it.
+//! `--edge-rule`: weights of profiles at the edges of their slice.
 
 use clap::ValueEnum;
 use stereology::files::profiles::ProfileRow;
@@ -9,15 +9,15 @@ use crate::failure::Failure;
 /// Rules for profiles at the edges of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EdgeRule {
-    /// A profile wholly inside counts W H / ((W - w)(H - h)), w and h the sides of its box (Miles & Lantuejoul)
+    /// Profiles entirely inside have the weight W H / ((W - w)(H - h)), where w and h are the sides of their bounding box (Miles-Lantuejoul)
     MilesLantuejoul,
-    /// What touches the left or upper edge does not count, all else does (counting frame); sizes must be of whole profiles
+    /// Counting frame: profiles that touch the left or the upper edge are excluded; sizes must be those of whole profiles
     Frame,
-    /// What has the middle of its box inside counts; profiles must be known beyond the edges
+    /// Plus sampling: profiles with the centre of their bounding box inside count; profiles must be known beyond the edges
     Plus,
-    /// Everything counts, cut or not: wrong, for comparison
+    /// All profiles count, truncated ones too: biased, for comparison
     All,
-    /// What touches an edge does not count: wrong, for comparison
+    /// Profiles that touch an edge are excluded: biased, for comparison
     Inside,
 }
 
@@ -32,7 +32,7 @@ impl EdgeRule {
         }
     }
 
-    /// Weighs the profiles of slices of this size, width and height; the weights of the table are replaced.
+    /// Replaces the weights of the table by those of the rule, for slices with this width and height.
     pub fn weigh(self, profiles: &mut [ProfileRow], window: Option<[f64; 2]>) -> Result<(), Failure> {
         let name = self.rule().name();
         let boxes: Option<Vec<BoundingBox>> = profiles.iter().map(|profile| profile.bounding_box).collect();
@@ -54,13 +54,13 @@ impl EdgeRule {
             }
             (None, _, Self::Inside) => {
                 return Err(Failure::run(
-                    "--edge-rule inside needs the column touches_edge (0 or 1), or the columns left, top, right, bottom (the box around each profile) with --window",
+                    "--edge-rule inside needs the column touches_edge (0 or 1), or the columns left, top, right, bottom (the bounding box of each profile) with --window",
                 ));
             }
             (None, ..) => {
                 return Err(Failure::run(format!(
-                    "--edge-rule {name} needs the columns left, top, right, bottom: the box around each profile, in a window that begins at 0,0. A table of \
-                     `stereology segment` has its weights by the rule given there"
+                    "--edge-rule {name} needs the columns left, top, right, bottom: the bounding box of each profile, in a window that begins at 0,0. A table from \
+                     `stereology segment` already has the weights of the rule given there"
                 )));
             }
         };

@@ -1,162 +1,312 @@
-//! What an unfolding is in JSON.
+//! JSON of an unfolding.
 
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::pipeline::CategoryDensities;
 use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, TypesUnfolding, Unfolding};
 
-/// Fields of the JSON object that an unfolding fills.
-pub fn figures(found: &Unfolding, kernel: &str) -> Vec<(&'static str, Value)> {
-    let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
-        let intervals = found.intervals.as_ref()?;
-        Some(intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
-    };
-    let mut fields = vec![
-        ("edges", json!(found.edges)),
-        ("number_density", json!(found.number_density)),
-        ("lower", json!(ends(|interval| interval.lower))),
-        ("upper", json!(ends(|interval| interval.upper))),
-    ];
-    let surface = found.surface_density.map(|surface| {
-        let names = ["surface_density", "surface_density_lower", "surface_density_upper"];
-        (names, surface)
-    });
-    let scalars = [
-        (["total", "total_lower", "total_upper"], found.total),
-        (["mean_size", "mean_size_lower", "mean_size_upper"], found.mean_size),
-        (
-            ["volume_fraction", "volume_fraction_lower", "volume_fraction_upper"],
-            found.volume_fraction,
-        ),
-    ];
-    for (names, estimate) in scalars.into_iter().chain(surface) {
-        fields.push((names[0], json!(estimate.value)));
-        if let Some(interval) = estimate.interval {
-            fields.push((names[1], json!(interval.lower)));
-            fields.push((names[2], json!(interval.upper)));
-        }
-    }
-    fields.extend([
-        ("profiles", json!(found.profiles)),
-        ("observed", json!(found.profiles_in(&found.edges, &found.observed))),
-        ("refolded", json!(found.profiles_in(&found.edges, &found.refolded))),
-        ("deviance", json!(found.deviance)),
-        ("degrees_of_freedom", json!(found.degrees_of_freedom)),
-        ("condition_number", json!(found.condition_number)),
-        ("penalty", json!(found.penalty.map(|penalty| penalty.weight))),
-        ("penalty_order", json!(found.penalty.map(|penalty| penalty.order))),
-        ("penalty_bend", json!(found.penalty.and_then(|penalty| penalty.bend))),
-        ("evidence", json!(found.evidence)),
-        ("evidence_for_sparse", json!(found.evidence_for_sparse)),
-        ("method", json!(found.method.name())),
-        ("kernel", json!(kernel)),
-        ("threshold", json!(found.threshold)),
-        ("clamped_bins", json!(found.clamped_bins.len())),
-        ("by_number", percentiles(&found.distribution.by_number)),
-        ("by_volume", percentiles(&found.distribution.by_volume)),
-        ("passing", ranged(&found.distribution.passing)),
-        (
-            "checks",
-            json!({ "profiles_per_area": check(found.profiles_per_area), "area_fraction": check(found.area_fraction) }),
-        ),
-    ]);
-    fields
+use crate::warnings::Record;
+
+/// Number densities and what follows from them: most of the JSON of `stereology unfold`, and `unfold` in that of `stereology synthesize`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct UnfoldingFields {
+    /// Edges of the size bins.
+    edges: Vec<f64>,
+    /// Particles per unit volume in each bin; null where a bin lies wholly below the detection limit.
+    number_density: Vec<Option<f64>>,
+    /// Lower ends of the confidence intervals; null without a bootstrap.
+    lower: Option<Vec<Option<f64>>>,
+    /// Upper ends of the confidence intervals; null without a bootstrap.
+    upper: Option<Vec<Option<f64>>>,
+    #[serde(flatten)]
+    scalars: Scalars,
+    /// Surface area per unit volume; absent if the surface of a shape is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface_density: Option<f64>,
+    /// Lower end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface_density_lower: Option<f64>,
+    /// Upper end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface_density_upper: Option<f64>,
+    /// Number of profiles.
+    profiles: usize,
+    /// Observed profiles per unit area in each bin.
+    observed: Vec<f64>,
+    /// Expected profiles per unit area in each bin, from the estimated densities.
+    refolded: Vec<f64>,
+    /// Deviance of the expected from the observed counts.
+    deviance: f64,
+    /// Degrees of freedom of the deviance.
+    degrees_of_freedom: usize,
+    /// Condition number of the kernel.
+    condition_number: f64,
+    /// Weight of the smoothness penalty; null without one.
+    penalty: Option<f64>,
+    /// Order of the penalised difference; null without a penalty.
+    penalty_order: Option<usize>,
+    /// Size below which the penalty is weaker; null without one.
+    penalty_bend: Option<f64>,
+    /// Logarithm of the evidence of the penalised estimate; null for other methods.
+    evidence: Option<f64>,
+    /// Logarithm of the evidence of the sparse estimate; null for other methods.
+    evidence_for_sparse: Option<f64>,
+    /// Method of estimation.
+    method: &'static str,
+    /// Position of sizes in their bin: integrated or upper-edge.
+    kernel: &'static str,
+    /// Detection limit; 0 without one.
+    threshold: f64,
+    /// Number of negative densities that were set to zero.
+    clamped_bins: usize,
+    /// Mean and percentiles of size by number.
+    by_number: PercentileFields,
+    /// Mean and percentiles of size by volume.
+    by_volume: PercentileFields,
+    /// Fraction of the volume in particles up to each edge: the grading curve.
+    passing: Ranged,
+    /// Observed totals compared with those expected from the densities.
+    checks: Checks,
 }
 
-/// What is told of a group of profiles, or of all groups together.
-pub struct Group<'a> {
-    number_density: &'a [Option<f64>],
-    intervals: Option<&'a [Option<Interval>]>,
-    scalars: [(&'static str, Estimate); 3],
+/// Totals of an unfolding, with confidence intervals if there is a bootstrap.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Scalars {
+    /// Particles per unit volume.
+    total: f64,
+    /// Lower end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    total_lower: Option<f64>,
+    /// Upper end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    total_upper: Option<f64>,
+    /// Mean particle size.
+    mean_size: f64,
+    /// Lower end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_size_lower: Option<f64>,
+    /// Upper end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean_size_upper: Option<f64>,
+    /// Fraction of the volume inside particles.
+    volume_fraction: f64,
+    /// Lower end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume_fraction_lower: Option<f64>,
+    /// Upper end of its confidence interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume_fraction_upper: Option<f64>,
 }
 
-impl<'a> Group<'a> {
-    /// One of them.
-    fn of(found: &'a Unfolding) -> Self {
+/// Mean and percentiles of a size distribution.
+#[derive(Debug, Serialize, JsonSchema)]
+struct PercentileFields {
+    /// Mean.
+    mean: Ranged,
+    /// Fractions to which the percentiles belong.
+    shares: Vec<f64>,
+    /// Sizes below which these fractions lie.
+    percentiles: Ranged,
+}
+
+/// Values with confidence intervals, if there is a bootstrap.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Ranged {
+    /// Estimates.
+    value: Vec<f64>,
+    /// Lower ends of the confidence intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lower: Option<Vec<f64>>,
+    /// Upper ends of the confidence intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    upper: Option<Vec<f64>>,
+}
+
+/// Observed totals compared with those expected from the densities.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Checks {
+    /// Profiles per unit area.
+    profiles_per_area: CheckFields,
+    /// Fraction of the area inside profiles.
+    area_fraction: CheckFields,
+}
+
+/// An observed value and its expectation.
+#[derive(Debug, Serialize, JsonSchema)]
+struct CheckFields {
+    /// Observed on the section.
+    observed: f64,
+    /// Expected from the densities.
+    expected: f64,
+}
+
+/// Densities of a colour category, or of all categories together.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct GroupFields {
+    /// Particles per unit volume in each bin; null where a bin lies wholly below the detection limit.
+    number_density: Vec<Option<f64>>,
+    /// Lower ends of the confidence intervals; null without a bootstrap.
+    lower: Option<Vec<Option<f64>>>,
+    /// Upper ends of the confidence intervals; null without a bootstrap.
+    upper: Option<Vec<Option<f64>>>,
+    #[serde(flatten)]
+    scalars: Scalars,
+}
+
+/// Densities of a colour category, or of one particle type in it.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CategoryFields {
+    #[serde(flatten)]
+    group: GroupFields,
+    /// Number of the category.
+    category: u8,
+    /// Particle type; null if types are not distinguished.
+    #[serde(rename = "type")]
+    kind: Option<usize>,
+    /// Number of profiles.
+    profiles: usize,
+    /// Method of estimation.
+    method: &'static str,
+    /// What deserves attention.
+    findings: Vec<Record>,
+}
+
+impl UnfoldingFields {
+    /// The fields of an unfolding with the kernel of this name.
+    pub fn of(found: &Unfolding, kernel: &'static str) -> Self {
+        let surface = found.surface_density;
+        let interval = surface.and_then(|of| of.interval);
+        let intervals = found.intervals.as_deref();
         Self {
-            number_density: &found.number_density,
-            intervals: found.intervals.as_deref(),
-            scalars: [
-                ("total", found.total),
-                ("mean_size", found.mean_size),
-                ("volume_fraction", found.volume_fraction),
-            ],
+            edges: found.edges.clone(),
+            number_density: found.number_density.clone(),
+            lower: ends(intervals, |interval| interval.lower),
+            upper: ends(intervals, |interval| interval.upper),
+            scalars: Scalars::of(found.total, found.mean_size, found.volume_fraction),
+            surface_density: surface.map(|of| of.value),
+            surface_density_lower: interval.map(|of| of.lower),
+            surface_density_upper: interval.map(|of| of.upper),
+            profiles: found.profiles,
+            observed: found.profiles_in(&found.edges, &found.observed),
+            refolded: found.profiles_in(&found.edges, &found.refolded),
+            deviance: found.deviance,
+            degrees_of_freedom: found.degrees_of_freedom,
+            condition_number: found.condition_number,
+            penalty: found.penalty.map(|penalty| penalty.weight),
+            penalty_order: found.penalty.map(|penalty| penalty.order),
+            penalty_bend: found.penalty.and_then(|penalty| penalty.bend),
+            evidence: found.evidence,
+            evidence_for_sparse: found.evidence_for_sparse,
+            method: found.method.name(),
+            kernel,
+            threshold: found.threshold,
+            clamped_bins: found.clamped_bins.len(),
+            by_number: PercentileFields::of(&found.distribution.by_number),
+            by_volume: PercentileFields::of(&found.distribution.by_volume),
+            passing: Ranged::of(&found.distribution.passing),
+            checks: Checks {
+                profiles_per_area: CheckFields::of(found.profiles_per_area),
+                area_fraction: CheckFields::of(found.area_fraction),
+            },
         }
     }
+}
 
-    /// All together.
-    pub fn sum(found: &'a TypesUnfolding) -> Self {
+/// One end of each interval.
+fn ends(intervals: Option<&[Option<Interval>]>, end: fn(&Interval) -> f64) -> Option<Vec<Option<f64>>> {
+    Some(intervals?.iter().map(|interval| interval.as_ref().map(end)).collect())
+}
+
+impl Scalars {
+    fn of(total: Estimate, mean_size: Estimate, volume_fraction: Estimate) -> Self {
+        let lower = |of: Estimate| of.interval.map(|interval| interval.lower);
+        let upper = |of: Estimate| of.interval.map(|interval| interval.upper);
         Self {
-            number_density: &found.number_density,
-            intervals: found.intervals.as_deref(),
-            scalars: [
-                ("total", found.total),
-                ("mean_size", found.mean_size),
-                ("volume_fraction", found.volume_fraction),
-            ],
+            total: total.value,
+            total_lower: lower(total),
+            total_upper: upper(total),
+            mean_size: mean_size.value,
+            mean_size_lower: lower(mean_size),
+            mean_size_upper: upper(mean_size),
+            volume_fraction: volume_fraction.value,
+            volume_fraction_lower: lower(volume_fraction),
+            volume_fraction_upper: upper(volume_fraction),
         }
     }
 }
 
-/// Densities and totals of a group.
-pub fn group_figures(of: &Group<'_>) -> Value {
-    let ends = |end: fn(&Interval) -> f64| -> Option<Vec<Option<f64>>> {
-        of.intervals
-            .map(|intervals| intervals.iter().map(|interval| interval.as_ref().map(end)).collect())
-    };
-    let mut fields = json!({
-        "number_density": of.number_density,
-        "lower": ends(|interval| interval.lower),
-        "upper": ends(|interval| interval.upper),
-    });
-    for (name, estimate) in of.scalars {
-        fields[name] = json!(estimate.value);
-        if let Some(interval) = estimate.interval {
-            fields[format!("{name}_lower")] = json!(interval.lower);
-            fields[format!("{name}_upper")] = json!(interval.upper);
+impl GroupFields {
+    /// One category.
+    fn of(found: &Unfolding) -> Self {
+        let intervals = found.intervals.as_deref();
+        Self {
+            number_density: found.number_density.clone(),
+            lower: ends(intervals, |interval| interval.lower),
+            upper: ends(intervals, |interval| interval.upper),
+            scalars: Scalars::of(found.total, found.mean_size, found.volume_fraction),
         }
     }
-    fields
+
+    /// All categories together.
+    pub fn sum(found: &TypesUnfolding) -> Self {
+        let intervals = found.intervals.as_deref();
+        Self {
+            number_density: found.number_density.clone(),
+            lower: ends(intervals, |interval| interval.lower),
+            upper: ends(intervals, |interval| interval.upper),
+            scalars: Scalars::of(found.total, found.mean_size, found.volume_fraction),
+        }
+    }
 }
 
-/// Every category, and every type of it where types are told apart.
-pub fn categories(of: &CategoryDensities) -> Vec<Value> {
+/// Every category, and every type in it where types are distinguished.
+pub fn categories(of: &CategoryDensities) -> Vec<CategoryFields> {
     let groups = of.categories.iter().zip(&of.kinds).zip(&of.found.types);
     groups
-        .map(|((category, kind), found)| {
-            let mut fields = group_figures(&Group::of(found));
-            fields["category"] = json!(category);
-            fields["type"] = json!(kind);
-            fields["profiles"] = json!(found.profiles);
-            fields["method"] = json!(found.method.name());
-            fields["findings"] = found
+        .map(|((category, kind), found)| CategoryFields {
+            group: GroupFields::of(found),
+            category: *category,
+            kind: *kind,
+            profiles: found.profiles,
+            method: found.method.name(),
+            findings: found
                 .findings
                 .iter()
-                .map(|finding| json!({ "code": finding.code, "message": finding.message }))
-                .collect();
-            fields
+                .map(|finding| Record {
+                    code: finding.code.to_owned(),
+                    message: finding.message.clone(),
+                })
+                .collect(),
         })
         .collect()
 }
 
-/// Mean and percentiles.
-fn percentiles(of: &Percentiles) -> Value {
-    json!({ "mean": ranged(&[of.mean]), "shares": SHARES, "percentiles": ranged(&of.percentiles) })
-}
-
-/// Values, with their intervals if they have them.
-fn ranged(estimates: &[Estimate]) -> Value {
-    let values: Vec<f64> = estimates.iter().map(|estimate| estimate.value).collect();
-    let ends: Option<Vec<Interval>> = estimates.iter().map(|estimate| estimate.interval).collect();
-    match ends {
-        None => json!({ "value": values }),
-        Some(ends) => json!({
-            "value": values,
-            "lower": ends.iter().map(|end| end.lower).collect::<Vec<_>>(),
-            "upper": ends.iter().map(|end| end.upper).collect::<Vec<_>>(),
-        }),
+impl PercentileFields {
+    fn of(of: &Percentiles) -> Self {
+        Self {
+            mean: Ranged::of(&[of.mean]),
+            shares: SHARES.to_vec(),
+            percentiles: Ranged::of(&of.percentiles),
+        }
     }
 }
 
-fn check(of: CrossCheck) -> Value {
-    json!({ "observed": of.observed, "expected": of.expected })
+impl Ranged {
+    fn of(estimates: &[Estimate]) -> Self {
+        let ends: Option<Vec<Interval>> = estimates.iter().map(|estimate| estimate.interval).collect();
+        Self {
+            value: estimates.iter().map(|estimate| estimate.value).collect(),
+            lower: ends.as_ref().map(|ends| ends.iter().map(|end| end.lower).collect()),
+            upper: ends.as_ref().map(|ends| ends.iter().map(|end| end.upper).collect()),
+        }
+    }
+}
+
+impl CheckFields {
+    fn of(of: CrossCheck) -> Self {
+        Self {
+            observed: of.observed,
+            expected: of.expected,
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! `stereology unfold`: profiles per area -> particles per volume.
+//! `stereology unfold`: from profiles per area to particles per volume.
 
 mod choices;
 mod edge_rule;
@@ -7,7 +7,8 @@ mod figures;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::files::densities::DensityRows;
 use stereology::files::profiles::{self, ProfileRow};
 use stereology::pipeline::{
@@ -16,18 +17,18 @@ use stereology::pipeline::{
 };
 use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter};
 
-use crate::answer::Answer;
-use crate::arguments::Everywhere;
+use crate::answer::{Answer, Fields, Notes};
+use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::numbers::{percent, significant};
 use crate::outputs::check_file;
 use crate::progress::{Step, go_on};
 use crate::values::{Window, count, positive};
+use stereology_report::{percent, significant};
 
 pub use choices::{Choices, Defaults, types};
 pub use edge_rule::EdgeRule;
-pub use figures::figures;
-use figures::{Group, categories, group_figures};
+pub use figures::UnfoldingFields;
+use figures::{CategoryFields, GroupFields, categories};
 
 /// Ten bins, and no intervals unless asked.
 const DEFAULTS: Defaults = Defaults {
@@ -35,20 +36,20 @@ const DEFAULTS: Defaults = Defaults {
     replicates: None,
 };
 
-/// From the sizes of the profiles on a cut to the number and sizes of the particles in the solid
+/// Estimates the number and sizes of particles in a solid from the profiles on a plane section
 ///
-/// Reads a table of profiles (CSV with a header) and tells how many particles of each size a unit of volume holds, as absolute numbers, with the refolded
-/// profile counts beside the observed ones, so that the fit can be judged.
+/// Reads a table of profiles (CSV with a header) and reports the number of particles per unit volume in each size bin. The expected profile counts (refolded)
+/// are reported beside the observed counts, so that the fit can be examined.
 ///
-/// PROFILES.csv has a column `size` (diameter of the circle with the profile's area) or `area`; if present, `type` (0-based index of --shape), `category`,
-/// `weight` (multiplies the count) and `slice` are used too. Other columns are ignored; the `profiles.csv` of `stereology segment` is such a table. --area is
-/// the total area examined: without it there are no absolute numbers. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs
-/// the box around each profile in columns `left`, `top`, `right`, `bottom` and the size of a slice.
+/// PROFILES.csv has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of --shape), `category`, `weight` (multiplies
+/// the count) and `slice` are used if present; other columns are ignored. `stereology segment` writes such a table as profiles.csv. --area is the total area
+/// examined, which absolute numbers require. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs the bounding box of each
+/// profile in the columns `left`, `top`, `right`, `bottom`, and the size of a slice.
 ///
-/// With --scale all lengths given here, in the table and in options, are multiplied by it.
+/// --scale multiplies all lengths, in the table and in the options.
 ///
-/// With several --shape and no `type` column all types share one size distribution in the given fractions (eqs. 10-12); with types each has its own (eq. 9).
-/// With several categories each is unfolded by itself too, on the same bins, and their sum.
+/// Several --shape without a `type` column share one size distribution in the given fractions (eqs. 10-12); with a `type` column each type has its own (eq. 9).
+/// Several categories are also unfolded separately, with the same bins, and summed.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology unfold out/profiles.csv --area 307200 --bins 10 --shape rock:1 -o densities.csv"
@@ -57,24 +58,24 @@ pub struct Unfold {
     /// Table of profiles
     #[arg(value_name = "PROFILES.csv")]
     pub profiles: PathBuf,
-    /// Total area examined, in the unit of length of the sizes, squared
+    /// Total area examined, in the squared unit of the sizes
     #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
     pub area: f64,
     #[command(flatten)]
     pub choices: Choices,
-    /// em stops when no densities could have a log-likelihood higher by more than this [default: 0.01]
+    /// Tolerance of em: stop when the log-likelihood is within this bound of its maximum [default: 0.01]
     #[arg(long, value_name = "T", value_parser = positive, help_heading = "Unfolding")]
     pub tolerance: Option<f64>,
-    /// em and ems stop after so many steps in any case [default: 100000]
+    /// Maximum number of iterations of em and ems [default: 100000]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Unfolding")]
     pub iterations: Option<usize>,
-    /// Weigh profiles at the edges by this rule instead of the column `weight`; needs the columns left, top, right, bottom and --window (all and inside: touches_edge will do)
+    /// Rule for profiles at the edges, instead of the column `weight`; needs the columns left, top, right, bottom and --window (for all and inside the column touches_edge suffices)
     #[arg(long, value_enum, help_heading = "Unfolding")]
     pub edge_rule: Option<EdgeRule>,
     /// Width and height of a slice, for --edge-rule
     #[arg(long, value_name = "WIDTH,HEIGHT", help_heading = "Unfolding")]
     pub window: Option<Window>,
-    /// Find the shares of several --shape from the profiles; refused where these do not tell
+    /// Estimate the fractions of several --shape from the profiles; refused if the profiles do not determine them
     #[arg(long, help_heading = "Unfolding")]
     pub unknown_fractions: bool,
     /// Also write the densities as a table: lower_edge,upper_edge,number_density,lower,upper,type,category
@@ -103,6 +104,69 @@ fn rows(found: &ParticleDensities) -> DensityRows {
     rows
 }
 
+/// JSON of `stereology unfold`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct UnfoldFields {
+    #[serde(flatten)]
+    all: UnfoldingFields,
+    /// Densities of each particle type; if the table has types.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    types: Option<Vec<TypeFields>>,
+    /// Densities of each colour category; if there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    categories: Option<Vec<CategoryFields>>,
+    /// Densities of all categories together; if there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    categories_sum: Option<GroupFields>,
+    /// Largest particle size; with --max-size likelihood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_size: Option<LikelihoodFields>,
+    /// Capping angle in degrees; with --capping-angle fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    capping_angle: Option<LikelihoodFields>,
+    #[serde(flatten)]
+    fractions: Option<FractionFields>,
+}
+
+/// Densities of a particle type.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TypeFields {
+    /// The shape as it was given.
+    shape: String,
+    /// Particles per unit volume in each bin; null where a bin lies wholly below the detection limit.
+    number_density: Vec<Option<f64>>,
+}
+
+/// A value of greatest likelihood.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LikelihoodFields {
+    /// Most likely value.
+    value: f64,
+    /// Lower end of its confidence interval.
+    lower: f64,
+    /// Upper end of its confidence interval.
+    upper: f64,
+    /// Whether the likelihood does not bound the value.
+    unbounded: bool,
+}
+
+/// Fractions of the particle types; with --unknown-fractions.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FractionFields {
+    /// Fraction of each shape, by number.
+    fractions: Vec<f64>,
+    /// Lower ends of the confidence intervals.
+    fractions_lower: Vec<f64>,
+    /// Upper ends of the confidence intervals.
+    fractions_upper: Vec<f64>,
+    /// Condition number of the estimation of fractions.
+    fractions_condition_number: f64,
+}
+
+impl Fields for UnfoldFields {
+    const COMMAND: &'static str = "unfold";
+}
+
 impl Unfold {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         if let Some(output) = &self.output {
@@ -119,7 +183,7 @@ impl Unfold {
         if let Some(output) = &self.output {
             rows(&found).write(output).at(output)?;
         }
-        Ok(self.answer(&found))
+        self.answer(&found)
     }
 
     /// The table, in the unit of the run.
@@ -165,26 +229,11 @@ impl Unfold {
         Failure::run(format!("{}: {error}{advice}", self.profiles.display()))
     }
 
-    fn answer(&self, found: &ParticleDensities) -> Answer {
+    fn answer(&self, found: &ParticleDensities) -> Result<Answer, Failure> {
         let sum = &found.all;
-        let mut answer = Answer::new("unfold");
-        for (name, value) in figures(sum, self.choices.kernel_name()) {
-            answer.field(name, value);
-        }
-        if !found.by_type.is_empty() {
-            let names = self.choices.shape.iter().map(|shape| &shape.shape);
-            let types: Vec<Value> = names
-                .zip(&found.by_type)
-                .map(|(shape, part)| json!({ "shape": shape, "number_density": part.number_density }))
-                .collect();
-            answer.field("types", types);
-        }
-        if let Some(of) = &found.categories {
-            answer.field("categories", categories(of));
-            answer.field("categories_sum", group_figures(&Group::sum(&of.found)));
-        }
+        let (mut notes, settled) = (Notes::default(), &found.settled);
         for finding in &found.findings {
-            answer.warn(finding.clone());
+            notes.warn(finding.clone());
         }
         let ranged = |estimate: Estimate, shown: fn(f64) -> String| match estimate.interval {
             Some(Interval { lower, upper }) => {
@@ -192,7 +241,7 @@ impl Unfold {
             }
             None => shown(estimate.value),
         };
-        answer
+        notes
             .line(format!(
                 "{} profiles, method {}, {} kernel",
                 sum.profiles,
@@ -219,50 +268,63 @@ impl Unfold {
             .line("size bin               particles per unit volume");
         for (bin, density) in sum.edges.windows(2).zip(&sum.number_density) {
             let density = density.map_or("unknown".to_owned(), significant);
-            answer.line(format!(
+            notes.line(format!(
                 "({:>8}, {:>8}]   {density}",
                 significant(bin[0]),
                 significant(bin[1])
             ));
         }
-        let largest = found.settled.largest.as_ref().and_then(|of| of.likelihood.as_ref());
-        if let Some(likely) = largest {
-            estimated(&mut answer, "max_size", likely, 1.0, "");
-        }
-        if let Some(likely) = &found.settled.capping {
-            estimated(&mut answer, "capping_angle", likely, 1.0_f64.to_degrees(), " degrees");
-        }
-        if let Some(found) = &found.settled.fractions {
-            fractions(&mut answer, found);
-        }
-        answer
+        let types = self
+            .choices
+            .shape
+            .iter()
+            .zip(&found.by_type)
+            .map(|(shape, part)| TypeFields {
+                shape: shape.shape.clone(),
+                number_density: part.number_density.clone(),
+            });
+        let largest = settled.largest.as_ref().and_then(|of| of.likelihood.as_ref());
+        let fields = UnfoldFields {
+            all: UnfoldingFields::of(sum, self.choices.kernel_name()),
+            types: (!found.by_type.is_empty()).then(|| types.collect()),
+            categories: found.categories.as_ref().map(categories),
+            categories_sum: found.categories.as_ref().map(|of| GroupFields::sum(&of.found)),
+            max_size: largest.map(|likely| estimated(&mut notes, "max size", likely, 1.0, "")),
+            capping_angle: settled
+                .capping
+                .as_ref()
+                .map(|likely| estimated(&mut notes, "capping angle", likely, 1.0_f64.to_degrees(), " degrees")),
+            fractions: settled.fractions.as_ref().map(|found| fractions(&mut notes, found)),
+        };
+        Answer::new(&fields, notes)
     }
 }
 
-/// A parameter of highest likelihood, in units of 1 / `scale`.
-fn estimated(answer: &mut Answer, name: &str, likely: &LikelyParameter, scale: f64, unit: &str) {
+/// A parameter of greatest likelihood, multiplied by `scale`.
+fn estimated(notes: &mut Notes, name: &str, likely: &LikelyParameter, scale: f64, unit: &str) -> LikelihoodFields {
     let [value, lower, upper] = [likely.value, likely.interval.lower, likely.interval.upper].map(|v| v * scale);
-    answer.field(
-        name,
-        json!({ "value": value, "lower": lower, "upper": upper, "unbounded": likely.unbounded }),
-    );
-    answer.line(format!(
-        "{} by likelihood    {} ({} to {}){unit}",
-        name.replace('_', " "),
+    notes.line(format!(
+        "{name} by likelihood    {} ({} to {}){unit}",
         significant(value),
         significant(lower),
         significant(upper)
     ));
+    LikelihoodFields {
+        value,
+        lower,
+        upper,
+        unbounded: likely.unbounded,
+    }
 }
 
-/// Fractions of the particle types of highest likelihood.
-fn fractions(answer: &mut Answer, found: &Fractions) {
-    let ends = |end: fn(&Interval) -> f64| found.intervals.iter().map(end).collect::<Vec<_>>();
-    answer
-        .field("fractions", json!(found.fractions))
-        .field("fractions_lower", ends(|of| of.lower))
-        .field("fractions_upper", ends(|of| of.upper))
-        .field("fractions_condition_number", json!(found.condition_number));
+/// Fractions of the particle types of greatest likelihood.
+fn fractions(notes: &mut Notes, found: &Fractions) -> FractionFields {
     let shown: Vec<String> = found.fractions.iter().map(|&fraction| percent(fraction)).collect();
-    answer.line(format!("fractions of the shapes     {}", shown.join(", ")));
+    notes.line(format!("fractions of the shapes     {}", shown.join(", ")));
+    FractionFields {
+        fractions: found.fractions.clone(),
+        fractions_lower: found.intervals.iter().map(|of| of.lower).collect(),
+        fractions_upper: found.intervals.iter().map(|of| of.upper).collect(),
+        fractions_condition_number: found.condition_number,
+    }
 }

@@ -1,6 +1,7 @@
-//! Numbers for people: three significant digits, thousands apart, shares in percent.
+//! Numbers as text for people: three significant digits, thousands separators, fractions in percent.
 
-/// Three significant digits, without an exponent where a person would not write one: `0.0123`, `1.23e-7`, `12,300`.
+/// Three significant digits; with an exponent only for very small or large values: `0.0123`, `1.23e-7`, `12,300`.
+#[must_use]
 pub fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -8,7 +9,7 @@ pub fn significant(value: f64) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
     }
-    let exponent = value.abs().log10().floor() as i32;
+    let exponent = decimal_exponent(value);
     if !(-3..9).contains(&exponent) {
         return format!("{value:.2e}");
     }
@@ -28,12 +29,23 @@ pub fn significant(value: f64) -> String {
     }
 }
 
-/// A count with thousands apart: `12,345`.
+/// Exponent of the leading digit of a finite number other than zero.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "log10 of a finite number lies between -324 and 309"
+)]
+fn decimal_exponent(value: f64) -> i32 {
+    value.abs().log10().floor() as i32
+}
+
+/// A count with thousands separators: `12,345`.
+#[must_use]
 pub fn counted(value: u64) -> String {
     thousands(&value.to_string())
 }
 
-/// A share in percent: `48.3 %`.
+/// A fraction in percent: `48.3 %`.
+#[must_use]
 pub fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share))
 }

@@ -1,4 +1,4 @@
-//! Pictures inside the page.
+//! Images inside a page, as data URLs.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -7,11 +7,11 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops;
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 
-/// Widest picture kept; larger ones are reduced.
+/// Largest width of an image; larger ones are reduced.
 const WIDEST: u32 = 1000;
 
 /// A photograph as a data URL.
-pub(super) fn photograph(picture: &RgbImage) -> String {
+pub(crate) fn photograph(picture: &RgbImage) -> String {
     let reduced = reduce(picture);
     let mut bytes = Vec::new();
     let done = JpegEncoder::new_with_quality(&mut bytes, 90).write_image(
@@ -26,8 +26,8 @@ pub(super) fn photograph(picture: &RgbImage) -> String {
     format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes))
 }
 
-/// A picture with thin lines as a data URL.
-pub(super) fn drawing(picture: &RgbImage) -> String {
+/// An image with thin lines as a data URL, without loss.
+pub(crate) fn drawing(picture: &RgbImage) -> String {
     let reduced = reduce(picture);
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive);
@@ -38,7 +38,7 @@ pub(super) fn drawing(picture: &RgbImage) -> String {
         ExtendedColorType::Rgb8,
     ) {
         Ok(()) => format!("data:image/png;base64,{}", STANDARD.encode(bytes)),
-        Err(_) => String::new(), // writing into memory fails only for an empty picture
+        Err(_) => String::new(), // writing into memory fails only for an empty image
     }
 }
 
@@ -47,8 +47,7 @@ fn reduce(picture: &RgbImage) -> RgbImage {
     if width <= WIDEST {
         return picture.clone();
     }
-    let reduced_height = (f64::from(height) * f64::from(WIDEST) / f64::from(width))
-        .round()
-        .max(1.0) as u32;
+    let reduced_height = (u64::from(height) * u64::from(WIDEST) + u64::from(width) / 2) / u64::from(width);
+    let reduced_height = u32::try_from(reduced_height.max(1)).unwrap_or(height);
     imageops::resize(picture, WIDEST, reduced_height, imageops::FilterType::CatmullRom)
 }

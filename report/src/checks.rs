@@ -2,26 +2,26 @@
 
 use stereology::pipeline::{Check, CheckName, Level, Verdict};
 
-use super::ReportInput;
-use crate::numbers::{percent, significant};
+use crate::figures::SynthesisReport;
+use crate::number::{percent, significant};
 
 /// A check for people.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub(crate) struct Row {
     /// What is examined.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What was found.
-    pub found: String,
+    pub(crate) found: String,
     /// What it should be.
-    pub should_be: String,
+    pub(crate) should_be: String,
     /// How it turned out.
-    pub level: Level,
+    pub(crate) level: Level,
     /// What it means, and what to do if it is not good.
-    pub meaning: &'static str,
+    pub(crate) meaning: &'static str,
 }
 
 /// Every check of the verdict.
-pub fn rows(input: &ReportInput) -> Vec<Row> {
+pub(crate) fn rows(input: &SynthesisReport) -> Vec<Row> {
     let row = |check: &Check| Row {
         name: title(check.name),
         found: found(check, input),
@@ -33,7 +33,7 @@ pub fn rows(input: &ReportInput) -> Vec<Row> {
 }
 
 /// The verdict in a sentence.
-pub fn sentence(verdict: &Verdict) -> String {
+pub(crate) fn sentence(verdict: &Verdict) -> String {
     let count = |level: Level| verdict.checks.iter().filter(|check| check.level == level).count();
     let checks = |n: usize| {
         if n == 1 {
@@ -61,7 +61,7 @@ pub fn sentence(verdict: &Verdict) -> String {
 }
 
 /// Numbers and appearance, each with its worst check unless all are good.
-pub fn opinions(verdict: &Verdict) -> String {
+pub(crate) fn opinions(verdict: &Verdict) -> String {
     let opinion = |of: &stereology::pipeline::Opinion| match of.level {
         Level::Good => "good".to_owned(),
         level => format!("{} ({})", word(level), title(of.worst).to_lowercase()),
@@ -74,7 +74,7 @@ pub fn opinions(verdict: &Verdict) -> String {
 }
 
 /// The level in a word.
-pub fn word(level: Level) -> &'static str {
+pub(crate) fn word(level: Level) -> &'static str {
     match level {
         Level::Good => "good",
         Level::Care => "with care",
@@ -99,7 +99,7 @@ fn title(name: CheckName) -> &'static str {
     }
 }
 
-fn found(check: &Check, input: &ReportInput) -> String {
+fn found(check: &Check, input: &SynthesisReport) -> String {
     let (sizes, comparison) = (&input.sizes, &input.comparison);
     let fractions = |synthetic: f64, photo: f64| format!("{}, photograph {}", percent(synthetic), percent(photo));
     match check.name {
@@ -135,7 +135,10 @@ fn found(check: &Check, input: &ReportInput) -> String {
             fractions(of.area_fraction_synthetic, of.area_fraction_photo)
         }),
         CheckName::Texture => {
-            let worst = comparison.spectrum.as_ref().and_then(|spectra| spectra.worst());
+            let worst = comparison
+                .spectrum
+                .as_ref()
+                .and_then(stereology::pipeline::ResidualSpectra::worst);
             match worst {
                 Some((frequency, ratio)) => format!(
                     "power differs by a factor of {}; at worst {} times {} at {} cycles per pixel",
@@ -151,7 +154,7 @@ fn found(check: &Check, input: &ReportInput) -> String {
 }
 
 /// The largest penetration of a certificate, in mean sizes; below zero the smallest gap.
-pub fn overlap(penetration: f64) -> String {
+pub(crate) fn overlap(penetration: f64) -> String {
     if penetration == f64::NEG_INFINITY {
         "no two bounding spheres meet".to_owned()
     } else if penetration < 0.0 {

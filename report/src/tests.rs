@@ -1,13 +1,14 @@
 //! The report of a made-up result.
 
 use image::{Rgb, RgbImage};
+use stereology::metrics::Finding;
 use stereology::pipeline::{Comparison, Evidence, Level, ResidualSpectra, Verdict};
 use stereology::unfold::{Estimate, Interval};
 
 use super::{
-    CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures, page,
+    CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, Remark, SectionFigures, SizeFigures,
+    SynthesisReport, synthesis_page,
 };
-use crate::warnings::Warning;
 
 /// Discs on a binder.
 fn picture(width: u32, height: u32, shift: u32) -> RgbImage {
@@ -23,7 +24,7 @@ fn picture(width: u32, height: u32, shift: u32) -> RgbImage {
     })
 }
 
-fn made_up_verdict(findings: &[Warning]) -> Verdict {
+fn made_up_verdict(findings: &[Finding]) -> Verdict {
     let exact = Comparison {
         profiles_photo: 335,
         profiles_synthetic: 5200,
@@ -53,8 +54,8 @@ fn made_up_verdict(findings: &[Warning]) -> Verdict {
     })
 }
 
-fn made_up() -> ReportInput {
-    let warnings = vec![Warning::new(
+fn made_up() -> SynthesisReport {
+    let warnings = vec![Finding::new(
         "near-minimum",
         "14 % of the profiles are below twice the smallest area (30 px)",
     )];
@@ -67,7 +68,7 @@ fn made_up() -> ReportInput {
         area_fraction_synthetic: 0.405,
         colour_distance: 0.011,
     };
-    ReportInput {
+    SynthesisReport {
         photo_name: "a <made-up> photograph.png".to_owned(),
         unit: "px".to_owned(),
         command: "stereology synthesize photograph.png -o out --shape rock:1".to_owned(),
@@ -76,7 +77,14 @@ fn made_up() -> ReportInput {
             ("--seed".to_owned(), "0".to_owned()),
         ],
         verdict: made_up_verdict(&warnings),
-        warnings,
+        remarks: warnings
+            .iter()
+            .map(|of| Remark {
+                code: of.code.to_owned(),
+                message: of.message.clone(),
+                advice: None,
+            })
+            .collect(),
         photo: PhotoFigures {
             picture: picture(480, 320, 0),
             overlay: picture(480, 320, 0),
@@ -153,6 +161,10 @@ fn made_up() -> ReportInput {
             }),
         },
     }
+}
+
+fn page(report: &SynthesisReport) -> String {
+    synthesis_page(report).unwrap()
 }
 
 #[test]

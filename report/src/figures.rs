@@ -1,39 +1,35 @@
-//! `report.html`: the page from which a person decides whether to trust the solid.
-//!
-//! One file without scripts or links: pictures and plots are inside. It holds nothing that differs between two runs with the same inputs and seed.
-
-mod measures;
-mod of_synthesis;
-mod page;
-mod pictures;
-mod plots;
-mod trust;
-
-pub use measures::{MeasureReport, measures_page};
-pub use of_synthesis::{Pictures, report_input};
-pub use page::page;
+//! Content of the report of a synthesis.
 
 use image::RgbImage;
 use stereology::pipeline::{ResidualSpectra, Verdict};
 
-use crate::warnings::Warning;
+/// A warning with its advice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remark {
+    /// Fixed code.
+    pub code: String,
+    /// What was found.
+    pub message: String,
+    /// What to do about it.
+    pub advice: Option<String>,
+}
 
-/// All that the report shows, as plain numbers and pictures.
+/// Content of the report of a synthesis: plain numbers and images.
 #[derive(Clone, Debug)]
-pub struct ReportInput {
+pub struct SynthesisReport {
     /// Name of the photograph, without its folder.
     pub photo_name: String,
-    /// Unit of length, as people read it: `px`, or `units`.
+    /// Unit of length: `px`, or `units`.
     pub unit: String,
-    /// The command that makes this result again.
+    /// The command that repeats the computation.
     pub command: String,
-    /// Every parameter and its value, in the order of the help.
+    /// Every parameter with its value, in the order of the help.
     pub parameters: Vec<(String, String)>,
-    /// Every warning of every step.
-    pub warnings: Vec<Warning>,
+    /// Warnings of all steps.
+    pub remarks: Vec<Remark>,
     /// Whether to trust the result.
     pub verdict: Verdict,
-    /// Photograph and what was found on it.
+    /// The photograph and its profiles.
     pub photo: PhotoFigures,
     /// Profiles and particles by size.
     pub sizes: SizeFigures,
@@ -43,18 +39,18 @@ pub struct ReportInput {
     pub comparison: ComparisonFigures,
 }
 
-/// What was found on the photograph.
+/// What was found in the photograph.
 #[derive(Clone, Debug)]
 pub struct PhotoFigures {
     /// The photograph.
     pub picture: RgbImage,
     /// The photograph with outlines.
     pub overlay: RgbImage,
-    /// Profiles that count.
+    /// Profiles counted by the edge rule.
     pub profiles: u64,
-    /// Profiles found, those left out at the edge included.
+    /// All profiles found.
     pub profiles_found: u64,
-    /// Share of the area inside profiles.
+    /// Fraction of the area inside profiles.
     pub area_fraction: f64,
     /// Profiles per unit area.
     pub number_per_area: f64,
@@ -82,13 +78,13 @@ pub struct SizeFigures {
     pub profile_edges: Vec<f64>,
     /// Profiles counted, by bin (weighted).
     pub observed: Vec<f64>,
-    /// Profiles that the fitted particles would show, by bin.
+    /// Expected profiles of the estimated particles, by bin.
     pub refolded: Vec<f64>,
     /// Edges of the particle size bins.
     pub particle_edges: Vec<f64>,
-    /// Particles per unit volume, by bin; `None` where nothing can be said.
+    /// Particles per unit volume, by bin; `None` below the detection limit.
     pub number_density: Vec<Option<f64>>,
-    /// Interval of each, if intervals were asked for.
+    /// Confidence interval of each, if there is a bootstrap.
     pub interval: Option<Vec<(f64, f64)>>,
     /// Particles per unit volume in the packing, by the same bins.
     pub packed: Vec<f64>,
@@ -100,7 +96,7 @@ pub struct SizeFigures {
     pub mean_size: f64,
     /// Volume fraction that follows from the unfolded densities.
     pub volume_fraction: f64,
-    /// Shapes and their shares.
+    /// Shapes and their fractions.
     pub shapes: Vec<(String, f64)>,
     /// Method and kernel by name.
     pub method: String,
@@ -123,11 +119,11 @@ pub struct PackingFigures {
     pub sides: [f64; 3],
     /// Fraction of the volume inside particles.
     pub fraction: f64,
-    /// The fraction asked for.
+    /// The requested fraction.
     pub requested_fraction: f64,
-    /// Rounds of relaxation.
+    /// Iterations of the packing.
     pub iterations: u64,
-    /// One period of the solid with three faces seen.
+    /// One period of the solid with three visible faces.
     pub cube: RgbImage,
 }
 
@@ -138,7 +134,7 @@ pub struct ComparisonFigures {
     pub sections: Vec<RgbImage>,
     /// Sections measured exactly.
     pub exact: SectionFigures,
-    /// Sections rendered and segmented as the photograph was.
+    /// Sections rendered and segmented like the photograph.
     pub resegmented: Option<SectionFigures>,
     /// Profile size histogram of the exact sections over `SizeFigures::profile_edges`, scaled to the photograph's area.
     pub profiles_synthetic: Vec<f64>,
@@ -153,13 +149,10 @@ pub struct SectionFigures {
     pub profiles: u64,
     /// Wasserstein-1 distance of profile sizes over their mean.
     pub size_w1: f64,
-    /// Share of the area inside profiles, photograph (as the same measure finds it).
+    /// Fraction of the area inside profiles, photograph, by the same measurement.
     pub area_fraction_photo: f64,
-    /// Share of the area inside profiles, sections.
+    /// Fraction of the area inside profiles, sections.
     pub area_fraction_synthetic: f64,
     /// Distance of the colours (Wasserstein-1, mean over channels), encoded, 0 to 1.
     pub colour_distance: f64,
 }
-
-#[cfg(test)]
-mod tests;

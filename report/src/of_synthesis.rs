@@ -1,51 +1,65 @@
-//! The report's numbers and pictures, from a synthesis.
+//! The report of a synthesis: its numbers and images.
 
 use image::RgbImage;
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{Comparison, ParticleTypes, Synthesis};
 use stereology::unfold::Interval;
 
-use super::{
-    CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, ReportInput, SectionFigures, SizeFigures,
+use crate::figures::{
+    CategoryFigures, ComparisonFigures, PackingFigures, PhotoFigures, Remark, SectionFigures, SizeFigures,
+    SynthesisReport,
 };
-use crate::arguments::Invocation;
 
-/// The pictures of a solid that the report shows.
+/// Images of a solid for its report.
 #[derive(Clone, Debug)]
-pub struct Pictures {
+pub struct SolidImages {
     /// One period of the solid.
     pub cube: RgbImage,
     /// Sections as large as the photograph.
     pub sections: Vec<RgbImage>,
 }
 
-/// The report of a synthesis.
-pub fn report_input(
-    synthesis: &Synthesis,
-    types: &ParticleTypes,
-    pictures: Pictures,
-    photo_name: &str,
-    invocation: &Invocation,
-) -> ReportInput {
-    let pixel = synthesis.details.residual.voxel;
-    ReportInput {
-        photo_name: photo_name.to_owned(),
-        unit: if (pixel - 1.0).abs() < 1e-12 { "px" } else { "units" }.to_owned(),
-        command: invocation.command.clone(),
-        parameters: invocation.parameters.clone(),
-        warnings: synthesis.findings.clone(),
-        verdict: synthesis.verdict.clone(),
-        photo: photo(synthesis, pixel),
-        sizes: sizes(synthesis, types),
-        packing: PackingFigures {
-            particles: synthesis.packing.particles().len() as u64,
-            sides: synthesis.packing.sides().into(),
-            fraction: synthesis.packing.fraction(),
-            requested_fraction: synthesis.population.fraction,
-            iterations: synthesis.packing.iterations() as u64,
-            cube: pictures.cube.clone(),
-        },
-        comparison: comparison(synthesis, pictures),
+/// How the computation was invoked.
+#[derive(Clone, Debug, Default)]
+pub struct Invocation {
+    /// Name of the photograph, without its folder.
+    pub photo_name: String,
+    /// The command that repeats the computation.
+    pub command: String,
+    /// Every parameter with its value.
+    pub parameters: Vec<(String, String)>,
+}
+
+impl SynthesisReport {
+    /// The report of a synthesis, with these warnings.
+    #[must_use]
+    pub fn new(
+        synthesis: &Synthesis,
+        types: &ParticleTypes,
+        images: SolidImages,
+        invocation: Invocation,
+        remarks: Vec<Remark>,
+    ) -> Self {
+        let pixel = synthesis.details.residual.voxel;
+        Self {
+            photo_name: invocation.photo_name,
+            unit: if (pixel - 1.0).abs() < 1e-12 { "px" } else { "units" }.to_owned(),
+            command: invocation.command,
+            parameters: invocation.parameters,
+            remarks,
+            verdict: synthesis.verdict.clone(),
+            photo: photo(synthesis, pixel),
+            sizes: sizes(synthesis, types),
+            packing: PackingFigures {
+                particles: synthesis.packing.particles().len() as u64,
+                sides: synthesis.packing.sides().into(),
+                fraction: synthesis.packing.fraction(),
+                requested_fraction: synthesis.population.fraction,
+                iterations: synthesis.packing.iterations() as u64,
+                cube: images.cube.clone(),
+            },
+            comparison: comparison(synthesis, images),
+        }
     }
 }
 
@@ -117,7 +131,7 @@ fn sizes(synthesis: &Synthesis, types: &ParticleTypes) -> SizeFigures {
     }
 }
 
-fn comparison(synthesis: &Synthesis, pictures: Pictures) -> ComparisonFigures {
+fn comparison(synthesis: &Synthesis, images: SolidImages) -> ComparisonFigures {
     let found = &synthesis.verification;
     let figures = |of: &Comparison| SectionFigures {
         profiles: of.profiles_synthetic as u64,
@@ -135,11 +149,11 @@ fn comparison(synthesis: &Synthesis, pictures: Pictures) -> ComparisonFigures {
             synthesis.profiles.area / found.section_area,
         ),
         spectrum: synthesis.spectra.clone(),
-        sections: pictures.sections,
+        sections: images.sections,
     }
 }
 
-/// How many values lie in each bin (a, b], times `weight`.
+/// Number of values in each bin (a, b], times `weight`.
 fn histogram(values: &[f64], edges: &[f64], weight: f64) -> Vec<f64> {
     let mut counts = vec![0_u64; edges.len().saturating_sub(1)];
     for &value in values {

@@ -1,32 +1,23 @@
-//! Plots as SVG text.
+//! Plots of a synthesis: profiles, particles and spectra.
 
 use std::ops::Range;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
-
 use stereology::pipeline::ResidualSpectra;
 
-use super::SizeFigures;
-
-const SIZE: (u32, u32) = (520, 320);
-const BARS: RGBColor = RGBColor(168, 187, 206);
-const FIT: RGBColor = RGBColor(196, 78, 32);
-const SOLID: RGBColor = RGBColor(38, 120, 88);
-const INK: RGBColor = RGBColor(60, 60, 60);
-
-type Failed = Box<dyn std::error::Error>;
+use crate::figures::SizeFigures;
+use crate::plot::{BARS, FIT, INK, Plot, SOLID, axes, highest, tick};
 
 /// Profiles by size: observed, refolded, and on sections of the solid.
-pub(super) fn profiles(sizes: &SizeFigures, synthetic: &[f64], unit: &str) -> String {
+pub(crate) fn profiles(sizes: &SizeFigures, synthetic: &[f64], unit: &str) -> Plot {
     let key = [
         (BARS, "photograph, with its counting error"),
         (FIT, "refolded fit"),
         (SOLID, "sections of the solid"),
     ];
-    drawn(&key, |area| {
+    Plot::draw(&key, |area| {
         let edges = &sizes.profile_edges;
-        // Per unit of size, so that bins of different widths compare.
+        // Per unit of size, so that bins of different widths are comparable.
         let each = |counts: &[f64]| -> Vec<f64> {
             edges
                 .windows(2)
@@ -54,12 +45,12 @@ pub(super) fn profiles(sizes: &SizeFigures, synthetic: &[f64], unit: &str) -> St
 }
 
 /// Particles by size: unfolded with intervals, and packed.
-pub(super) fn particles(sizes: &SizeFigures, unit: &str) -> String {
-    drawn(&[(BARS, "unfolded"), (SOLID, "packed")], |area| {
+pub(crate) fn particles(sizes: &SizeFigures, unit: &str) -> Plot {
+    Plot::draw(&[(BARS, "unfolded"), (SOLID, "packed")], |area| {
         let edges = &sizes.particle_edges;
         let density: Vec<f64> = sizes.number_density.iter().map(|n| n.unwrap_or(0.0)).collect();
         let intervals = sizes.interval.clone().unwrap_or_default();
-        // An interval may be far wider than what it is about; the bars must stay visible.
+        // An interval can be much wider than its bar, which must stay visible.
         let bulk = highest(density.iter().copied().chain(sizes.packed.iter().copied()));
         let top = highest(intervals.iter().map(|interval| interval.1)).clamp(bulk, 3.0 * bulk);
         let mut chart = axes(
@@ -84,8 +75,8 @@ pub(super) fn particles(sizes: &SizeFigures, unit: &str) -> String {
 }
 
 /// Power spectra of the residual.
-pub(super) fn spectra(spectrum: &ResidualSpectra) -> String {
-    drawn(
+pub(crate) fn spectra(spectrum: &ResidualSpectra) -> Plot {
+    Plot::draw(
         &[(INK, "photograph"), (SOLID, "slices of the residual volume")],
         |area| {
             let positive = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -132,142 +123,13 @@ pub(super) fn spectra(spectrum: &ResidualSpectra) -> String {
     )
 }
 
-const BESIDE: [(RGBColor, &str); 2] = [(INK, "exemplar"), (FIT, "volume")];
-
-/// Curves of exemplar and volume over the same places.
-pub(super) fn pair(places: &[f64], values: &[Vec<f64>; 2], x_name: &str, y_name: &str) -> String {
-    let points = [0, 1].map(|k| {
-        places
-            .iter()
-            .copied()
-            .zip(values[k].iter().copied())
-            .collect::<Vec<_>>()
-    });
-    beside(points, x_name, y_name)
-}
-
-/// Shares of values up to each, of two sorted lists.
-pub(super) fn distribution(values: &[Vec<f64>; 2], x_name: &str) -> String {
-    let points = [0, 1].map(|k| {
-        let n = values[k].len() as f64;
-        let shares = (0..values[k].len()).map(|i| (i + 1) as f64 / n);
-        // The longest in a hundred would press the others together.
-        let most = |(_, share): &(f64, f64)| *share <= 0.99;
-        values[k]
-            .iter()
-            .copied()
-            .zip(shares)
-            .take_while(most)
-            .collect::<Vec<_>>()
-    });
-    beside(points, x_name, "share")
-}
-
-/// A value of every slice of the volume; the exemplar's mean is a line across.
-pub(super) fn slices(values: &[Vec<f64>; 2], x_name: &str, y_name: &str) -> String {
-    let n = values[1].len().max(1) as f64;
-    let mean = values[0].iter().sum::<f64>() / values[0].len().max(1) as f64;
-    let of_volume = values[1]
-        .iter()
-        .enumerate()
-        .map(|(i, v)| ((i as f64 + 0.5) / n, *v))
-        .collect();
-    beside([vec![(0.0, mean), (1.0, mean)], of_volume], x_name, y_name)
-}
-
-fn beside(points: [Vec<(f64, f64)>; 2], x_name: &str, y_name: &str) -> String {
-    let all = || points.iter().flatten().copied();
-    let (left, right) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
-    if left >= right {
-        return "<p>There is nothing to show.</p>".to_owned();
-    }
-    drawn(&BESIDE, |area| {
-        let lowest = all().map(|p| p.1).fold(0.0, f64::min);
-        let is_below = lowest < 0.0 && all().all(|p| p.1 <= 0.0);
-        let top = if is_below { 0.0 } else { highest(all().map(|p| p.1)) };
-        let mut chart = axes(area, left..right, 1.08 * lowest..top, x_name, y_name)?;
-        for (points, (colour, _)) in points.iter().zip(BESIDE) {
-            chart.draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?;
-        }
-        Ok(())
-    })
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// The key of a plot and its SVG, scaled by the page; a plot that cannot be drawn says so.
-fn drawn(key: &[(RGBColor, &str)], draw: impl FnOnce(&Area<'_>) -> Result<(), Failed>) -> String {
-    let mut svg = String::new();
-    let result = {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        draw(&area).and_then(|()| area.present().map_err(Failed::from))
-    };
-    if let Err(error) = result {
-        return format!("<p>This plot could not be drawn: {error}</p>");
-    }
-    let key: String = key
-        .iter()
-        .map(|(colour, what)| {
-            let RGBColor(r, g, b) = colour;
-            format!("<span><i style=\"background: rgb({r}, {g}, {b})\"></i>{what}</span>")
-        })
-        .collect();
-    let fixed = format!("width=\"{}\" height=\"{}\" ", SIZE.0, SIZE.1);
-    format!(
-        "<div class=\"key\">{key}</div>{}",
-        svg.replacen(&fixed, "role=\"img\" ", 1)
-    )
-}
-
-type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
-type Linear = plotters::coord::types::RangedCoordf64;
-
-fn axes<'a, 'b>(
-    area: &'a Area<'b>,
-    x: Range<f64>,
-    y: Range<f64>,
-    x_name: &str,
-    y_name: &str,
-) -> Result<Chart<'a, 'b, Linear, Linear>, Failed> {
-    let mut chart = ChartBuilder::on(area)
-        .margin(12)
-        .x_label_area_size(42)
-        .y_label_area_size(64)
-        .build_cartesian_2d(x, y)?;
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(INK.mix(0.1))
-        .x_desc(x_name)
-        .y_desc(y_name)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
-        .axis_style(INK.mix(0.5))
-        .label_style(("sans-serif", 14, &INK))
-        .draw()?;
-    Ok(chart)
-}
-
-/// 1, 2 and 5 of each decade; the others would overlap.
+/// Labels 1, 2 and 5 of each decade; more would overlap.
 fn decade(value: f64) -> String {
     let leading = value / 10_f64.powf(value.log10().floor());
     if [1.0, 2.0, 5.0, 10.0].iter().any(|shown| (leading - shown).abs() < 1e-6) {
         tick(value)
     } else {
         String::new()
-    }
-}
-
-fn tick(value: f64) -> String {
-    // Marks are computed by steps, and zero may be missed by rounding.
-    if value.abs() < 1e-12 {
-        "0".to_owned()
-    } else if value.abs() >= 1e5 || value.abs() < 1e-3 {
-        format!("{value:.1e}")
-    } else {
-        let text = format!("{value:.4}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
     }
 }
 
@@ -304,9 +166,4 @@ fn steps(edges: &[f64], heights: &[f64]) -> Vec<(f64, f64)> {
 fn span(edges: &[f64]) -> Range<f64> {
     let last = edges.last().copied().filter(|last| *last > 0.0).unwrap_or(1.0);
     0.0..last
-}
-
-fn highest(values: impl Iterator<Item = f64>) -> f64 {
-    let highest = values.filter(|value| value.is_finite()).fold(0.0, f64::max);
-    if highest > 0.0 { 1.08 * highest } else { 1.0 }
 }

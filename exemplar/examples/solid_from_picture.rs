@@ -1,4 +1,4 @@
-//! A layered solid from one picture, and how like the picture its slices are.
+//! A layered solid from one image, and how similar its slices are to the image.
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 
 use ndarray::{Array2, Axis};
@@ -25,6 +25,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{name}: {value:.4}");
         }
     }
-    println!("{:.0} % of the picture's pixels are used", 100.0 * solid.coverage);
+    println!("{:.0} % of the image's pixels are used", 100.0 * solid.coverage);
     Ok(())
 }

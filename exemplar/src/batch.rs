@@ -1,5 +1,5 @@
-//! All voxels at once: first every neighbourhood looks for its like in the exemplars, then every voxel is chosen from what the
-//! neighbourhoods that cover it say.
+//! The batch solver: first the most similar window of the exemplars is found for every neighbourhood, then every voxel
+//! is chosen from the votes of the neighbourhoods that contain it.
 
 use std::ops::ControlFlow;
 
@@ -7,24 +7,26 @@ use rayon::prelude::*;
 
 use crate::field::{Field, Plane, VIEWS, sheet_of};
 use crate::level::NONE;
+use crate::numbers::{number, single};
 use crate::search::Query;
 use crate::stage::{R, Stage, Tallies, Votes};
 use crate::tallies::Usage;
 
-/// Parts a search or a round of votes is cut into; histograms are brought up to date after each.
+/// Number of parts of a search or a voting pass; the histograms are updated after each part.
 const PARTS: usize = 16;
 /// Side of the blocks in which votes are gathered.
 const BLOCK: usize = 8;
 
-/// What one slice found: matches, squared distances, energy, number of neighbourhoods.
+/// Result of one slice: matches, squared distances, energy, number of neighbourhoods.
 type Found = (Vec<u32>, Vec<f32>, f64, usize);
 
 impl Stage<'_> {
-    /// Every neighbourhood's like; the mean energy of a neighbourhood. `go_on` is told how much of the search is done; a break
-    /// ends it.
+    /// Finds the most similar window for every neighbourhood and returns the mean energy of a neighbourhood. `go_on`
+    /// receives the completed fraction of the search and can cancel it.
     ///
-    /// With an index histogram, a window that is used too often becomes dearer after each part, one that is used too seldom
-    /// cheaper: the prices are the dual variables of the assignment that uses all windows alike, and their steps settle.
+    /// With an index histogram, the price of a window that is used too often rises after each part, and that of a
+    /// window used too seldom falls. The prices are the dual variables of the assignment that uses all windows equally
+    /// often, and their steps decrease from iteration to iteration.
     pub(crate) fn search(
         &self,
         field: &mut Field,
@@ -69,7 +71,7 @@ impl Stage<'_> {
         ControlFlow::Continue(energy / count.max(1) as f64)
     }
 
-    /// Price of each place; none without an index histogram.
+    /// Price of each place; empty without an index histogram.
     fn prices(&self, usage: &Usage, prices: &[f32]) -> Vec<f32> {
         if self.recipe.index == 0.0 {
             return Vec::new();
@@ -78,7 +80,8 @@ impl Stage<'_> {
         usage.bins().iter().map(price).collect()
     }
 
-    /// One slice, row by row, forwards and backwards in turn: each neighbourhood profits from what those before it found.
+    /// Searches one slice row by row, alternately forwards and backwards, so that each neighbourhood can continue the
+    /// matches of those before it.
     fn search_slice(&self, field: &Field, view: usize, slice: usize, iteration: usize, prices: &[f32]) -> Found {
         let (level, window) = (self.level, self.window);
         let plane = Plane::cut(field, view, slice, window);
@@ -128,7 +131,7 @@ impl Stage<'_> {
             }
             let price = |place: usize| if prices.is_empty() { 0.0 } else { prices[place] };
             let (place, distance) = self.finder.nearest(&query, &bases, price);
-            matches[i] = place as u32;
+            matches[i] = number(place);
             gaps[i] = distance;
             energy += f64::from(distance.powf(R / 2.0));
             count += 1;
@@ -136,7 +139,7 @@ impl Stage<'_> {
         (matches, gaps, energy, count)
     }
 
-    /// Every voxel from the votes of the neighbourhoods within `radius` of it.
+    /// Chooses every voxel from the votes of the neighbourhoods within `radius` of it.
     pub(crate) fn vote(&self, field: &mut Field, tallies: &mut Tallies, radius: usize) {
         self.weigh(field);
         let [nz, ny, nx] = field.size;
@@ -161,11 +164,12 @@ impl Stage<'_> {
         }
     }
 
-    /// Makes squared distances the weights of votes, d^(r - 2), never more than that of a small part of the mean distance.
+    /// Replaces squared distances by the weights of votes, d^(r - 2), with the mean distance added so that they stay
+    /// finite.
     pub(crate) fn weigh(&self, field: &mut Field) {
         for gaps in &mut field.gaps {
             let mean = gaps.iter().map(|&g| f64::from(g)).sum::<f64>() / gaps.len() as f64;
-            let floor = mean as f32 + 1e-9;
+            let floor = single(mean) + 1e-9;
             gaps.par_iter_mut().for_each(|g| *g = (*g + floor).powf(R / 2.0 - 1.0));
         }
     }
@@ -177,7 +181,7 @@ impl Stage<'_> {
         let mut sources = vec![NONE; ny * nx];
         let mut values = vec![0.0; ny * nx * channels];
         let mut votes = Votes::default();
-        // Blocks, because the slices of constant x lie far apart in memory.
+        // In blocks, because slices of constant x are far apart in memory.
         for y0 in (0..ny).step_by(BLOCK) {
             for x0 in (0..nx).step_by(BLOCK) {
                 for y in y0..ny.min(y0 + BLOCK) {
@@ -194,21 +198,22 @@ impl Stage<'_> {
         (sources, values)
     }
 
-    /// The votes for one voxel: of every neighbourhood within `radius` the pixel that its match has there.
+    /// The votes for one voxel: for every neighbourhood within `radius`, the pixel of its match at the voxel's
+    /// position.
     pub(crate) fn gather(&self, field: &Field, multipliers: &[f32], at: [usize; 3], radius: usize, votes: &mut Votes) {
         votes.clear();
         let reach = radius as isize;
-        // With few voters the middle one counts most: the result stays sharp.
+        // With few votes the central one counts most, which keeps the result sharp.
         let edge = if radius == 1 { self.recipe.edge } else { 1.0 };
-        let falls = [1.0, edge, edge * edge];
+        let factors = [1.0, edge, edge * edge];
         let mut vote = |matched: u32, weight: f32, dr: isize, dc: isize| {
-            let place = (matched as isize - dr * self.level.width as isize - dc) as u32;
-            let fall = if radius == 1 {
-                falls[(dr * dr + dc * dc) as usize]
+            let place = number((matched as isize - dr * self.level.width as isize - dc) as usize);
+            let factor = if radius == 1 {
+                factors[(dr * dr + dc * dc) as usize]
             } else {
                 1.0
             };
-            votes.push(place, fall * weight * multipliers[place as usize]);
+            votes.push(place, factor * weight * multipliers[place as usize]);
         };
         for (view, (matches, weights)) in field.matches.iter().zip(&field.gaps).enumerate() {
             let [slices, rows, columns] = VIEWS[view];

@@ -1,13 +1,13 @@
-//! Where a solid is made: its size, its mask, the voxels that are given.
+//! The domain of a solid: its size, its mask and its fixed voxels.
 
 use ndarray::{Array3, ArrayView3};
 
-use crate::SolidError;
+use crate::error::SolidError;
 
-/// A voxel that is given: (z, y, x), and its value in every colour channel (phases: the phase's number).
+/// A fixed voxel: (z, y, x), and its value in every colour channel (for phases the number of the phase).
 pub type FixedVoxel = ([usize; 3], Vec<f32>);
 
-/// The box a solid is made in.
+/// The box in which a solid is made.
 ///
 /// # Examples
 ///
@@ -15,7 +15,8 @@ pub type FixedVoxel = ([usize; 3], Vec<f32>);
 /// use ndarray::Array3;
 /// use stereology_exemplar::{Domain, SolidError};
 ///
-/// let ball = Array3::from_shape_fn((16, 16, 16), |(z, y, x)| [z, y, x].iter().map(|&i| (i as f64 - 7.5).powi(2)).sum::<f64>() < 49.0);
+/// let square = |i: usize| (i as f64 - 7.5).powi(2);
+/// let ball = Array3::from_shape_fn((16, 16, 16), |(z, y, x)| square(z) + square(y) + square(x) < 49.0);
 /// let domain = Domain::new([16; 3])?.with_mask(ball.view())?.with_fixed(vec![([8, 8, 8], vec![0.5])])?;
 /// assert_eq!(domain.voxels(), 1_472);
 /// assert!(matches!(domain.with_fixed(vec![([0, 0, 0], vec![0.5])]), Err(SolidError::FixedOutsideMask { .. })));
@@ -30,7 +31,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// A whole box of `size` (nz, ny, nx) that repeats without a seam along each axis.
+    /// A whole box of `size` (nz, ny, nx) that is periodic along each axis.
     ///
     /// # Errors
     ///
@@ -48,14 +49,14 @@ impl Domain {
         })
     }
 
-    /// A box whose opposite faces have nothing to do with each other.
+    /// The box without periodicity: opposite faces are independent.
     #[must_use]
     pub fn open(mut self) -> Self {
         self.periodic = false;
         self
     }
 
-    /// Nothing is written outside the mask (z, y, x), and nothing there is looked at.
+    /// With a mask (z, y, x): voxels outside are neither written nor compared.
     ///
     /// # Errors
     ///
@@ -78,13 +79,13 @@ impl Domain {
         Ok(self)
     }
 
-    /// Voxels that are given and kept exactly; what is made around them fits them. The same voxel may be given twice if its
-    /// values agree.
+    /// With voxels whose values are fixed exactly; the voxels around them are made to fit. The same voxel may be given
+    /// twice if its values are equal.
     ///
     /// # Errors
     ///
-    /// [`SolidError::FixedOutside`], [`SolidError::FixedOutsideMask`], [`SolidError::FixedTwice`], [`SolidError::FixedValue`]
-    /// for a value that is not finite.
+    /// [`SolidError::FixedOutside`], [`SolidError::FixedOutsideMask`], [`SolidError::FixedTwice`],
+    /// [`SolidError::FixedValue`] for a value that is not finite.
     pub fn with_fixed(mut self, mut fixed: Vec<FixedVoxel>) -> Result<Self, SolidError> {
         for (at, value) in &fixed {
             if at.iter().zip(&self.size).any(|(i, n)| i >= n) {
@@ -126,7 +127,7 @@ impl Domain {
         self.size
     }
 
-    /// Does the solid repeat without a seam?
+    /// Whether the solid is periodic.
     #[must_use]
     pub fn is_periodic(&self) -> bool {
         self.periodic
@@ -140,13 +141,13 @@ impl Domain {
         })
     }
 
-    /// The mask, if only a part of the box is made.
+    /// The mask, if only a part of the box is filled.
     #[must_use]
     pub fn mask(&self) -> Option<&Array3<bool>> {
         self.mask.as_ref()
     }
 
-    /// The voxels that are given, sorted by position.
+    /// The fixed voxels, sorted by position.
     #[must_use]
     pub fn fixed(&self) -> &[FixedVoxel] {
         &self.fixed

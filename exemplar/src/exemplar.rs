@@ -1,10 +1,12 @@
-//! The pictures a solid is made from.
+//! The images from which a solid is made.
 
 use ndarray::{ArrayView2, ArrayView3};
 
-use crate::SolidError;
+use crate::error::SolidError;
+use crate::numbers::MOST_SIDE;
 
-/// A picture of the material: grey, colours or phases, and perhaps further channels that only guide the synthesis.
+/// An image of the material: grey levels, colours or phases, and optional further channels that only guide the
+/// synthesis.
 ///
 /// # Examples
 ///
@@ -23,32 +25,33 @@ use crate::SolidError;
 pub struct Exemplar {
     height: usize,
     width: usize,
-    /// Channels one after the other: colours (phases: one an indicator; two phases share one), then features.
+    /// Channels one after the other: colours (for phases one indicator each; two phases share one), then features.
     planes: Vec<f32>,
-    /// Channels of the result before phases are told apart.
+    /// Colour channels or indicators.
     colours: usize,
     phases: Option<Vec<u32>>,
 }
 
 impl Exemplar {
-    /// A grey picture (row, column); values of 0 to 1 suit the histograms best, any are allowed.
+    /// A grey image (row, column). Any values are allowed; 0 to 1 suit the histograms best.
     ///
     /// # Errors
     ///
-    /// [`SolidError::NotFinite`], [`SolidError::ConstantExemplar`].
+    /// [`SolidError::NotFinite`], [`SolidError::ConstantExemplar`], [`SolidError::ExemplarTooLarge`].
     pub fn grey(image: ArrayView2<'_, f32>) -> Result<Self, SolidError> {
         Self::colour(image.insert_axis(ndarray::Axis(2)))
     }
 
-    /// A picture (row, column, channel) of as many colour channels as it has.
+    /// An image (row, column, channel) of any number of colour channels.
     ///
     /// # Errors
     ///
-    /// [`SolidError::NotFinite`], [`SolidError::ConstantExemplar`].
+    /// [`SolidError::NotFinite`], [`SolidError::ConstantExemplar`], [`SolidError::ExemplarTooLarge`].
     pub fn colour(image: ArrayView3<'_, f32>) -> Result<Self, SolidError> {
         let (height, width, colours) = image.dim();
+        check_size(height, width)?;
         let planes = planes(image)?;
-        #[allow(clippy::float_cmp, reason = "the very same value everywhere is what is asked")]
+        #[allow(clippy::float_cmp, reason = "equality to the bit is meant")]
         let constant = |plane: &[f32]| plane.iter().all(|v| *v == plane[0]);
         if planes.is_empty() || planes.chunks_exact(height * width).all(constant) {
             return Err(SolidError::ConstantExemplar);
@@ -62,19 +65,21 @@ impl Exemplar {
         })
     }
 
-    /// A map of phases or labels (row, column), all of whose numbers stand for themselves: they are not ordered. The solid gets
-    /// their fractions exactly (to the voxel). At most 16 phases.
+    /// A map of at most 16 phases or labels (row, column). The order of the numbers has no meaning. The solid gets
+    /// exactly their fractions, to the voxel.
     ///
     /// # Errors
     ///
-    /// [`SolidError::ConstantExemplar`] for a single phase, [`SolidError::Mismatch`] for more than 16.
+    /// [`SolidError::ConstantExemplar`] for a single phase, [`SolidError::Mismatch`] for more than 16,
+    /// [`SolidError::ExemplarTooLarge`].
     pub fn phase_map(labels: ArrayView2<'_, u32>) -> Result<Self, SolidError> {
+        check_size(labels.nrows(), labels.ncols())?;
         let mut phases: Vec<u32> = labels.iter().copied().collect();
         phases.sort_unstable();
         phases.dedup();
         if phases.len() > 16 {
             return Err(SolidError::Mismatch {
-                what: format!("a phase map of {} phases: at most 16 can be told apart", phases.len()),
+                what: format!("a phase map of {} phases: at most 16 are supported", phases.len()),
             });
         }
         if phases.len() < 2 {
@@ -94,12 +99,12 @@ impl Exemplar {
         })
     }
 
-    /// With further channels (row, column, channel) that count in the comparison of neighbourhoods, `weight` times as much as
-    /// colours do, but are no part of the result: a distance from edges, an orientation, a mineral's chemistry.
+    /// With further channels (row, column, channel) that are compared with `weight` times the weight of colours but are
+    /// not part of the result, such as the distance to edges, an orientation or the chemistry of a mineral.
     ///
     /// # Errors
     ///
-    /// [`SolidError::Mismatch`] if they have another size than the picture, [`SolidError::NotFinite`].
+    /// [`SolidError::Mismatch`] if their size differs from the image's, [`SolidError::NotFinite`].
     pub fn with_features(mut self, features: ArrayView3<'_, f32>, weight: f32) -> Result<Self, SolidError> {
         let (height, width, _) = features.dim();
         if (height, width) != self.shape() {
@@ -112,7 +117,7 @@ impl Exemplar {
         }
         if !weight.is_finite() || weight < 0.0 {
             return Err(SolidError::Mismatch {
-                what: format!("the weight of features must be positive, not {weight}"),
+                what: format!("the weight of features must not be negative, and not {weight}"),
             });
         }
         let scale = weight.sqrt();
@@ -143,7 +148,7 @@ impl Exemplar {
         self.planes.len() / (self.height * self.width)
     }
 
-    /// The first of [`Exemplar::channels`] that are no features.
+    /// The number of [`Exemplar::channels`] that are not features.
     pub(crate) fn inner_colours(&self) -> usize {
         self.colours
     }
@@ -151,6 +156,13 @@ impl Exemplar {
     pub(crate) fn planes(&self) -> Vec<f32> {
         self.planes.clone()
     }
+}
+
+fn check_size(height: usize, width: usize) -> Result<(), SolidError> {
+    if height.max(width) > MOST_SIDE {
+        return Err(SolidError::ExemplarTooLarge { height, width });
+    }
+    Ok(())
 }
 
 fn planes(image: ArrayView3<'_, f32>) -> Result<Vec<f32>, SolidError> {

@@ -1,4 +1,4 @@
-//! The solid while it is made, at one level.
+//! The state of the solid at one level.
 
 use ndarray::ArrayView3;
 use rand::{RngExt, SeedableRng};
@@ -7,7 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use crate::level::{Atlas, LANES, Level, NONE};
 use crate::window::Window;
 
-/// Axes (0 z, 1 y, 2 x) of the slices of a view: constant along the first, rows along the second, columns along the third.
+/// Axes (0 z, 1 y, 2 x) of the slices of a view: constant along the first, rows along the second, columns along the
+/// third.
 pub(crate) const VIEWS: [[usize; 3]; 3] = [[1, 0, 2], [2, 0, 1], [0, 1, 2]];
 
 /// Voxels at one level.
@@ -16,34 +17,34 @@ pub(crate) struct Field {
     pub(crate) periodic: bool,
     /// Values (z, y, x), one channel after the other.
     pub(crate) values: Vec<Vec<f32>>,
-    /// Place in the level of the exemplar's pixel that each voxel shows (z, y, x).
+    /// Place in the level of the exemplar's pixel from which each voxel (z, y, x) is copied.
     pub(crate) sources: Vec<u32>,
-    /// By view, (slice, row, column): place of the exemplar's window nearest to that about the voxel.
+    /// By view, (slice, row, column): place of the exemplar's window that is most similar to that about the voxel.
     pub(crate) matches: Vec<Vec<u32>>,
-    /// By view, as matches: squared distance of the two windows.
+    /// By view, in the same order: squared distance of the two windows.
     pub(crate) gaps: Vec<Vec<f32>>,
-    /// Voxels that are made (z, y, x); all if `None`.
+    /// Voxels (z, y, x) inside the mask; all if `None`.
     pub(crate) inside: Option<Vec<bool>>,
-    /// Voxels that are given, sorted, and their values.
+    /// Fixed voxels, sorted, and their values.
     pub(crate) fixed: Vec<(u32, Vec<f32>)>,
-    /// Whether a voxel is given (z, y, x); empty if none is.
+    /// Whether a voxel (z, y, x) is fixed; empty if none is.
     pub(crate) is_fixed: Vec<bool>,
 }
 
-/// Which exemplar each view shows.
+/// The exemplar of each view.
 pub(crate) fn sheet_of(view: usize, exemplars: usize) -> usize {
     view.min(exemplars - 1)
 }
 
 impl Field {
-    /// Voxels that are made or given.
+    /// Number of voxels inside the mask.
     pub(crate) fn voxels(&self) -> usize {
         self.inside
             .as_ref()
             .map_or(self.sources.len(), |inside| inside.iter().filter(|i| **i).count())
     }
 
-    /// Is this voxel (z, y, x) made, or given?
+    /// Whether this voxel (z, y, x) is inside the mask.
     #[inline]
     pub(crate) fn holds(&self, voxel: usize) -> bool {
         self.inside.as_ref().is_none_or(|inside| inside[voxel])
@@ -56,7 +57,7 @@ impl Field {
         (at[slice] * self.size[row] + at[row]) * self.size[column] + at[column]
     }
 
-    /// Calls `with` the number, in the order of a view, of every voxel that is made or given.
+    /// Calls `with` with the number, in the order of a view, of every voxel inside the mask.
     pub(crate) fn each_held_in_view(&self, view: usize, mut with: impl FnMut(usize)) {
         let [_, ny, nx] = self.size;
         for voxel in (0..self.sources.len()).filter(|&voxel| self.holds(voxel)) {
@@ -75,7 +76,7 @@ impl Field {
         VIEWS[view].map(|axis| self.size[axis])
     }
 
-    /// Random pixels of the exemplars, random matches.
+    /// Initialises the voxels with random pixels of the exemplars and random matches.
     pub(crate) fn begin(&mut self, level: &Level, views: usize, seed: u64) {
         let n = self.sources.len();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -98,7 +99,8 @@ impl Field {
         self.show(level);
     }
 
-    /// After [`Field::begin`]: what these pixels (z, y, x at the finest level) show, where they are any, and the windows about them.
+    /// After [`Field::begin`]: initialises the voxels with these pixels (z, y, x at the finest level) and the windows
+    /// about them; numbers that are no pixel leave a voxel as it is.
     pub(crate) fn begin_with(&mut self, level: &Level, pixels: ArrayView3<'_, u32>) {
         let exemplars = level.windows.len();
         let [_, ny, nx] = self.size;
@@ -122,7 +124,7 @@ impl Field {
         self.show(level);
     }
 
-    /// Values from sources; given voxels keep theirs, and what is outside the mask shows nothing.
+    /// Copies values from the sources; fixed voxels keep their values, and voxels outside the mask are 0.
     pub(crate) fn show(&mut self, level: &Level) {
         for (channel, values) in self.values.iter_mut().enumerate() {
             let theirs = &level.values[channel * level.stride..(channel + 1) * level.stride];
@@ -141,8 +143,8 @@ impl Field {
         }
     }
 
-    /// Takes sources, matches and values of the next coarser level: each of eight children the pixel beside its parent's that
-    /// lies where the child lies. `continuous` takes values from the parent instead of from the source.
+    /// Takes sources, matches and values of the next coarser level: each of eight children the pixel beside its
+    /// parent's that lies where the child lies. `continuous` takes values from the parent instead of from the source.
     pub(crate) fn refine(&mut self, coarse: &Self, from: &Level, to: &Level, atlas: &Atlas, continuous: bool) {
         let child = |place: u32, row: usize, column: usize| {
             let (sheet, y, x) = atlas.locate(from.pixel[place as usize] as usize);
@@ -175,7 +177,7 @@ impl Field {
                     let voxel = self.index([z, y, x]);
                     let parent = coarse.index([z / 2, y / 2, x / 2]);
                     let source = coarse.sources[parent];
-                    // The view whose match lies nearest to the source tells how it is oriented.
+                    // The view whose match is the source determines its orientation.
                     let place = [z, y, x].map(|i| i / 2);
                     let (sheet, ..) = atlas.locate(from.pixel[source as usize] as usize);
                     let view = (0..views)
@@ -216,7 +218,7 @@ pub(crate) struct Plane {
     /// Samples of a channel.
     stride: usize,
     values: Vec<f32>,
-    /// 1 where a voxel is made or given; empty if everywhere.
+    /// 1 inside the mask; empty if the whole plane is inside.
     inside: Vec<f32>,
 }
 
@@ -274,8 +276,8 @@ impl Plane {
         plane
     }
 
-    /// Copies the window about a voxel; tells how many of its pixels count, after writing to `weights` which do, where the
-    /// solid is bounded.
+    /// Copies the window about a voxel. In a bounded solid it writes to `weights` which of its pixels count and returns
+    /// their number.
     #[inline]
     pub(crate) fn window(
         &self,

@@ -1,24 +1,27 @@
-//! A solid that is there already, made more like its exemplars.
-
-use std::ops::ControlFlow;
+//! Improvement of an existing solid.
 
 use ndarray::ArrayView3;
+use stereology_metrics::Progress;
 
-use crate::synthesis::synthesize;
-use crate::{Domain, Exemplar, Method, Solid, SolidError, SolidOptions};
+use crate::domain::Domain;
+use crate::error::SolidError;
+use crate::exemplar::Exemplar;
+use crate::options::{Method, SolidOptions};
+use crate::synthesis::{Solid, synthesize};
 
-/// Makes a solid that was made in another way more like its exemplars: [`Method::Best`] from voxels that show `pixels`
-/// (z, y, x; numbers as [`Solid::sources`], others where nothing is shown) instead of random ones. What is coarser than a neighbourhood of the coarsest level stays as it is.
+/// Makes an existing solid more similar to its exemplars: runs [`Method::Best`] from the given `pixels` (z, y, x;
+/// numbers as in [`Solid::sources`], any other number where there is none) instead of random ones. Structures coarser
+/// than a neighbourhood of the coarsest level are kept.
 ///
-/// Method and solver of `options` do not count. Cost as [`synthesize_solid`](crate::synthesize_solid).
+/// Method and solver of `options` are ignored. Cost as for [`synthesize_solid`](crate::synthesize_solid).
 ///
 /// # Errors
 ///
-/// [`SolidError`]; [`SolidError::Mismatch`] if `pixels` has another size than the domain.
+/// [`SolidError`]; [`SolidError::Mismatch`] if the sizes of `pixels` and domain differ.
 ///
 /// # Examples
 ///
-/// Two halves that do not fit together:
+/// Two halves that do not match:
 ///
 /// ```
 /// use ndarray::{Array2, Array3};
@@ -31,7 +34,8 @@ use crate::{Domain, Exemplar, Method, Solid, SolidError, SolidOptions};
 /// let seam = |v: &dyn Fn(usize, usize) -> f32| (0..20).map(|z| (v(z, 9) - v(z, 10)).abs()).sum::<f32>();
 /// let before = seam(&|z, x| layers[[z + if x < 10 { 0 } else { 3 }, x]]);
 /// let domain = Domain::new([20; 3])?.open();
-/// let solid = finish_solid(&exemplar, &domain, broken.view(), &SolidOptions::default(), &|_| ControlFlow::Continue(()))?;
+/// let go = |_: f64| ControlFlow::Continue(());
+/// let solid = finish_solid(&exemplar, &domain, broken.view(), &SolidOptions::default(), &go)?;
 /// assert!(seam(&|z, x| solid.values[[z, 5, x, 0]]) < 0.5 * before);
 /// # Ok::<(), stereology_exemplar::SolidError>(())
 /// ```
@@ -40,7 +44,7 @@ pub fn finish_solid(
     domain: &Domain,
     pixels: ArrayView3<'_, u32>,
     options: &SolidOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Solid, SolidError> {
     let (nz, ny, nx) = pixels.dim();
     if [nz, ny, nx] != domain.size() {

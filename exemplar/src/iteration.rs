@@ -1,26 +1,27 @@
-//! The solid while it is made, for those who want to watch.
+//! The intermediate state of the solid after an iteration.
 
 use ndarray::Array4;
 
 use crate::field::Field;
 
-/// The solid as it stands after an iteration: what [`synthesize_solid_watched`](crate::synthesize_solid_watched) shows.
+/// The solid after an iteration, as [`synthesize_solid_watched`](crate::synthesize_solid_watched) passes it to its
+/// callback.
 #[derive(Clone, Copy)]
 pub struct Iteration<'a> {
-    /// How many levels are still to come; 0 at the finest.
+    /// Number of finer levels that follow; 0 at the finest level.
     pub coarser_by: usize,
     /// Number of the iteration at this level, from 1.
     pub number: usize,
     /// Mean energy of a neighbourhood, as in [`LevelReport`](crate::LevelReport).
     pub energy: f64,
     pub(crate) field: &'a Field,
-    /// Channels that are no features.
+    /// Channels that are not features.
     pub(crate) colours: usize,
 }
 
 impl Iteration<'_> {
-    /// Values (z, y, x, channel) at this level's size, copied; 0 outside the mask. Of phases these are indicators, one a phase (two
-    /// phases share the second's), because phases are settled at the end.
+    /// Values (z, y, x, channel) at this level's size, copied; 0 outside the mask. For phases these are indicators, one
+    /// per phase (two phases share that of the second), because phases are assigned at the end.
     #[must_use]
     pub fn values(&self) -> Array4<f32> {
         let [nz, ny, nx] = self.field.size;

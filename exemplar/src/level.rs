@@ -1,11 +1,12 @@
-//! Exemplars at one scale, laid out so that a step of one pixel is a step of one voxel of the solid at that scale.
+//! Exemplars at one scale, arranged so that a step of one pixel is a step of one voxel of the solid at that scale.
 //!
-//! At level l a voxel stands for 2^l fine ones. The exemplars are smoothed, but need not be thinned out: the pixels whose
-//! row and column leave the same rests modulo 2^l form a picture of that scale, and all 4^l of them are laid side by side. A
-//! thinned pyramid keeps the first only: five levels of 128 x 128 pixels then leave 8 x 8, with four windows of 7 x 7, where
-//! the full set has 6,400.
+//! At level l a voxel stands for 2^l fine ones. The exemplars are smoothed but need not be subsampled: the pixels whose
+//! row and column have the same remainders modulo 2^l form an image of that scale, and all 4^l of these images are
+//! placed side by side. A thinned pyramid keeps only the first: five levels of 128 x 128 pixels then leave 8 x 8 with
+//! four windows of 7 x 7, while the full set has 6,400.
 
-use crate::Exemplar;
+use crate::exemplar::Exemplar;
+use crate::numbers::{number, small};
 
 /// No pixel.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -30,11 +31,11 @@ pub(crate) struct Level {
     pub(crate) owner: Vec<u8>,
     /// Places of complete windows, by exemplar.
     pub(crate) windows: Vec<Vec<u32>>,
-    /// Places that hold a pixel, by exemplar.
+    /// Places with a pixel, by exemplar.
     pub(crate) places: Vec<Vec<u32>>,
 }
 
-/// Where the pixels of several exemplars stand in one list.
+/// Positions of the pixels of several exemplars in one list.
 #[derive(Clone, Debug)]
 pub(crate) struct Atlas {
     /// (first pixel, height, width) of each exemplar.
@@ -69,7 +70,8 @@ impl Atlas {
         (sheet, (pixel - first) / width, (pixel - first) % width)
     }
 
-    /// Pixel of an exemplar at a row and column; beyond its last, the last that is `step` pixels or a multiple before.
+    /// Pixel of an exemplar at a row and column; beyond the last row or column, the last one a multiple of `step`
+    /// pixels before.
     pub(crate) fn at(&self, sheet: usize, row: usize, column: usize, step: usize) -> usize {
         let (first, height, width) = self.sheets[sheet];
         let back = |i: usize, n: usize| {
@@ -95,8 +97,8 @@ pub(crate) fn smoothed(exemplar: &Exemplar, levels: usize) -> Vec<Vec<f32>> {
     stack
 }
 
-/// Each pixel becomes the mean of itself and the pixel `step` on, weights 1 3 3 1 a row and a column: so a voxel at one level
-/// is the mean of its two children along each axis, a little widened. Mirrored at the edges.
+/// Each pixel becomes the mean of itself and the pixel `step` further, with weights 1 3 3 1 along rows and columns: a
+/// voxel at one level is the mean of its two children along each axis, slightly smoothed. Mirrored at the edges.
 fn halved(plane: &[f32], height: usize, width: usize, step: usize) -> Vec<f32> {
     let mirror = |i: isize, n: usize| -> usize {
         let period = 2 * n as isize;
@@ -142,7 +144,7 @@ impl Level {
         let tile = |n: usize| n.div_ceil(step);
         let width = exemplars.iter().map(|e| tile(e.shape().1) * phases).max().unwrap_or(0);
         let height: usize = exemplars.iter().map(|e| tile(e.shape().0) * phases).sum();
-        // Windows read whole lanes, a little beyond the last row.
+        // Windows read whole lanes, which extend beyond the last row.
         let stride = width * height + width * half + 4 * LANES;
         let mut made = Self {
             step,
@@ -170,17 +172,17 @@ impl Level {
                     }
                     let place = (first_row + y) * width + x;
                     let pixel = atlas.at(sheet, row, column, 1);
-                    made.pixel[place] = pixel as u32;
-                    made.place[pixel] = place as u32;
-                    made.places[sheet].push(place as u32);
+                    made.pixel[place] = number(pixel);
+                    made.place[pixel] = number(place);
+                    made.places[sheet].push(number(place));
                     for channel in 0..channels {
                         made.values[channel * stride + place] =
                             stacks[sheet][level][channel * rows * columns + row * columns + column];
                     }
                     let fits = |i: usize, n: usize| i >= half * step && i + half * step < n;
                     if fits(row, rows) && fits(column, columns) {
-                        made.owner[place] = sheet as u8 + 1;
-                        made.windows[sheet].push(place as u32);
+                        made.owner[place] = small(sheet) + 1;
+                        made.windows[sheet].push(number(place));
                     }
                 }
             }
@@ -195,7 +197,7 @@ impl Level {
         self.values[channel * self.stride + place as usize]
     }
 
-    /// Is the window about this place complete and of this exemplar?
+    /// Whether the window about this place is complete and of this exemplar.
     #[inline]
     pub(crate) fn fits(&self, place: usize, sheet: usize) -> bool {
         self.owner

@@ -1,42 +1,46 @@
-//! How a solid is made.
+//! Options of the synthesis.
 
-/// Which method makes the solid.
+use crate::scan::Scan;
+
+/// The method of synthesis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Ours: all voxels at once, every voxel an exemplar's pixel, colours, positions and neighbourhoods of the exemplar used
-    /// evenly, and votes from ever nearer neighbours in the last half of the iterations. The default.
+    /// This crate's method and the default: all voxels are updated together, every voxel is a pixel of the exemplar,
+    /// its colours, positions and neighbourhoods are used evenly, and votes come from nearer and nearer neighbours in
+    /// the last half of the iterations.
     #[default]
     Best,
     /// Wei & Levoy 2000: the mean of the best match in each view.
     WeiLevoy,
-    /// Kopf et al. 2007: a mean weighted by similarity and by what the colour histogram lacks.
+    /// Kopf et al. 2007: a mean weighted by similarity and by the deficit of the colour histogram.
     Kopf,
     /// Chen & Wang 2010: an exemplar's pixel, chosen by position and index histograms.
     ChenWang,
 }
 
-/// In which order voxels learn of each other.
+/// The order in which voxels are updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
-    /// Voxel by voxel along the scan, each seen by the next: urs-2012.
+    /// Voxel by voxel along the scan; each update is visible to the next: urs-2012.
     Sequential,
-    /// First all neighbourhoods are compared, then all voxels are written: Kopf et al. 2007.
+    /// All neighbourhoods are compared, then all voxels are written: Kopf et al. 2007.
     Batch,
 }
 
-/// How the exemplar's neighbourhood nearest to one of the solid is found.
+/// How the neighbourhood of the exemplar that is most similar to one of the solid is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Search {
-    /// All of the exemplar's are compared: the reference, slow.
+    /// All neighbourhoods of the exemplar are compared; slow, the reference.
     Exact,
-    /// Wei & Levoy's tree-structured vector quantisation: down a tree of means, to one leaf.
+    /// Wei & Levoy's tree-structured vector quantisation: down a tree of means to one leaf.
     Tsvq,
-    /// Those that continue the neighbours' matches, and what is most like them: Ashikhmin 2001, Tong et al. 2002.
+    /// The continuations of the neighbours' matches, and the neighbourhoods most similar to them: Ashikhmin 2001, Tong
+    /// et al. 2002.
     #[default]
     KCoherence,
 }
 
-/// Slices of which directions look like the exemplars.
+/// The directions of the slices that look like the exemplars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Views {
     /// Constant y (the first exemplar) and constant x (the second): laminar materials.
@@ -46,7 +50,7 @@ pub enum Views {
 }
 
 impl Views {
-    /// How many.
+    /// Number of directions.
     #[must_use]
     pub fn count(self) -> usize {
         match self {
@@ -71,25 +75,26 @@ impl Views {
 pub struct SolidOptions {
     /// The method.
     pub method: Method,
-    /// Voxel by voxel, or all at once; by method if `None`.
+    /// The solver; by method if `None`.
     pub solver: Option<Solver>,
     /// Order of the voxels of the sequential solver.
-    pub scan: crate::Scan,
+    pub scan: Scan,
     /// How neighbourhoods are found.
     pub search: Search,
     /// Directions of slices.
     pub views: Views,
-    /// Levels, each half as fine as the one before; by the size of the exemplar's features if `None`.
+    /// Number of levels, each with half the resolution of the one before; by the size of the exemplar's features if
+    /// `None`.
     pub levels: Option<usize>,
     /// Side of the neighbourhood in pixels, odd.
     pub neighbourhood: usize,
-    /// Neighbourhoods of what was visited before only (Wei & Levoy's L); sequential solver.
+    /// Whether neighbourhoods contain only voxels visited before (Wei & Levoy's L shape); for the sequential solver.
     pub causal: bool,
-    /// Iterations a level.
+    /// Iterations per level.
     pub iterations: usize,
     /// Similar pixels kept for each pixel; by method if `None`.
     pub similar: Option<usize>,
-    /// Seed of everything random.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
@@ -98,7 +103,7 @@ impl Default for SolidOptions {
         Self {
             method: Method::default(),
             solver: None,
-            scan: crate::Scan::default(),
+            scan: Scan::default(),
             search: Search::default(),
             views: Views::Three,
             levels: None,
@@ -119,7 +124,7 @@ impl SolidOptions {
         self
     }
 
-    /// With a solver that is not the method's own.
+    /// With another solver than the method's own.
     #[must_use]
     pub fn with_solver(mut self, solver: Solver) -> Self {
         self.solver = Some(solver);
@@ -128,7 +133,7 @@ impl SolidOptions {
 
     /// With another order of the voxels.
     #[must_use]
-    pub fn with_scan(mut self, scan: crate::Scan) -> Self {
+    pub fn with_scan(mut self, scan: Scan) -> Self {
         self.scan = scan;
         self
     }
@@ -147,7 +152,7 @@ impl SolidOptions {
         self
     }
 
-    /// With so many levels.
+    /// With `levels` levels.
     #[must_use]
     pub fn with_levels(mut self, levels: usize) -> Self {
         self.levels = Some(levels);
@@ -168,14 +173,14 @@ impl SolidOptions {
         self
     }
 
-    /// With so many iterations a level.
+    /// With `iterations` iterations per level.
     #[must_use]
     pub fn with_iterations(mut self, iterations: usize) -> Self {
         self.iterations = iterations;
         self
     }
 
-    /// With so many similar pixels for each pixel.
+    /// With `similar` similar pixels kept for each pixel.
     #[must_use]
     pub fn with_similar(mut self, similar: usize) -> Self {
         self.similar = Some(similar);
@@ -189,7 +194,7 @@ impl SolidOptions {
         self
     }
 
-    /// The solver that will be used.
+    /// The solver in effect.
     #[must_use]
     pub fn solver(&self) -> Solver {
         self.solver.unwrap_or(match self.method {

@@ -1,6 +1,7 @@
-//! Maps of phases: exact fractions.
+//! Assignment of phases with exact fractions.
 
 use crate::field::Field;
+use crate::numbers::{number, small};
 use crate::stage::{Stage, Votes};
 
 /// Phase of a voxel's channels: indicators, of which two phases share one.
@@ -12,25 +13,28 @@ pub(crate) fn phase_of(value: impl Fn(usize) -> f32, phases: usize) -> usize {
 }
 
 impl Stage<'_> {
-    /// Phase of each voxel, with exactly the exemplars' fractions: where a phase has too many voxels, those whose votes are most
-    /// for one that has too few change. Given voxels do not. `gaps` must hold weights.
+    /// Phase of each voxel, with exactly the exemplars' fractions: if a phase has too many voxels, those with the
+    /// largest margin of votes for a phase with too few are reassigned. Fixed voxels are not. `gaps` must contain
+    /// weights.
     pub(crate) fn settle_phases(&self, field: &mut Field, phases: usize) -> Vec<u8> {
         let exemplars = self.level.places.len();
-        let mut shares = vec![0.0; phases];
+        let mut fractions = vec![0.0; phases];
         for places in &self.level.places {
             for &place in places {
                 let phase = phase_of(|channel| self.level.value(channel, place), phases);
-                shares[phase] += 1.0 / (places.len() * exemplars) as f64;
+                fractions[phase] += 1.0 / (places.len() * exemplars) as f64;
             }
         }
         let mut labels: Vec<u8> = (0..field.sources.len())
-            .map(|voxel| phase_of(|channel| field.values[channel][voxel], phases) as u8)
+            .map(|voxel| small(phase_of(|channel| field.values[channel][voxel], phases)))
             .collect();
-        let held: Vec<u32> = (0..labels.len() as u32)
+        let held: Vec<u32> = (0..number(labels.len()))
             .filter(|&voxel| field.holds(voxel as usize))
             .collect();
-        // Positive: too many.
-        let mut surplus = rounded(&shares, held.len()).map(|wanted| -wanted).collect::<Vec<i64>>();
+        // Positive for phases with too many voxels.
+        let mut surplus = rounded(&fractions, held.len())
+            .map(|wanted| -wanted)
+            .collect::<Vec<i64>>();
         for &voxel in &held {
             surplus[usize::from(labels[voxel as usize])] += 1;
         }
@@ -74,7 +78,7 @@ impl Stage<'_> {
                 if surplus[usize::from(*label)] > 0 {
                     surplus[usize::from(*label)] -= 1;
                     surplus[wanted] += 1;
-                    *label = wanted as u8;
+                    *label = small(wanted);
                     field.sources[voxel as usize] = source;
                 }
             }
@@ -83,11 +87,12 @@ impl Stage<'_> {
     }
 }
 
-/// Whole numbers of `n` in these shares: largest remainders.
-fn rounded(shares: &[f64], n: usize) -> impl Iterator<Item = i64> {
-    let exact: Vec<f64> = shares.iter().map(|share| share * n as f64).collect();
+/// Whole numbers with the sum `n` in these fractions, by largest remainders.
+#[allow(clippy::cast_possible_truncation, reason = "numbers of voxels")]
+fn rounded(fractions: &[f64], n: usize) -> impl Iterator<Item = i64> {
+    let exact: Vec<f64> = fractions.iter().map(|fraction| fraction * n as f64).collect();
     let mut whole: Vec<i64> = exact.iter().map(|v| v.floor() as i64).collect();
-    let mut order: Vec<usize> = (0..shares.len()).collect();
+    let mut order: Vec<usize> = (0..fractions.len()).collect();
     order.sort_by(|&a, &b| {
         (exact[b] - exact[b].floor())
             .total_cmp(&(exact[a] - exact[a].floor()))
@@ -105,13 +110,13 @@ mod tests {
     use super::{phase_of, rounded};
 
     #[test]
-    fn phases_are_told_from_indicators() {
+    fn phases_follow_from_indicators() {
         assert_eq!(phase_of(|_| 0.5, 2), 1);
         assert_eq!(phase_of(|channel| [0.2, 0.5, 0.3][channel], 3), 1);
     }
 
     #[test]
-    fn shares_become_whole_voxels() {
+    fn fractions_become_whole_voxels() {
         assert_eq!(rounded(&[0.3, 0.3, 0.4], 4).collect::<Vec<_>>(), [1, 1, 2]);
         assert_eq!(rounded(&[0.5, 0.5], 27).sum::<i64>(), 27);
     }

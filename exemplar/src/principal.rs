@@ -1,25 +1,27 @@
-//! Windows of the exemplars in few numbers: their principal components.
+//! Principal components of the windows of the exemplars.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
 use crate::level::Level;
+use crate::numbers::single;
 use crate::window::Window;
 
-/// Windows the components are learnt from.
+/// Number of windows from which the components are computed.
 const SAMPLE: usize = 4096;
 
-/// Windows of one exemplar, projected on the principal components that hold most of their variance.
+/// Windows of one exemplar, projected on the principal components that contain most of their variance.
 pub(crate) struct Projected {
-    /// Numbers a window.
+    /// Number of components.
     pub(crate) dimensions: usize,
     /// Projected windows, one after the other, in the order of the level's list of windows.
     pub(crate) points: Vec<f32>,
 }
 
 impl Projected {
-    /// Projects the windows of exemplar `sheet` on as many components as hold `share` of the variance, at most `most`.
-    pub(crate) fn new(level: &Level, sheet: usize, window: &Window, share: f64, most: usize) -> Self {
+    /// Projects the windows of exemplar `sheet` on the components that contain the fraction `kept` of the variance, at
+    /// most `most`.
+    pub(crate) fn new(level: &Level, sheet: usize, window: &Window, kept: f64, most: usize) -> Self {
         let places = &level.windows[sheet];
         let counted: Vec<usize> = (0..window.len())
             .filter(|i| window.weights[i % window.weights.len()] > 0.0)
@@ -47,9 +49,9 @@ impl Projected {
             .iter()
             .take(most)
             .take_while(|&&i| {
-                let go_on = held < share * all;
+                let more = held < kept * all;
                 held += eigen.eigenvalues[i].max(0.0);
-                go_on
+                more
             })
             .count()
             .max(1);
@@ -58,7 +60,7 @@ impl Projected {
             .map(|&i| {
                 let mut padded = vec![0.0; window.len()];
                 for (j, &at) in counted.iter().enumerate() {
-                    padded[at] = eigen.eigenvectors[(j, i)] as f32;
+                    padded[at] = single(eigen.eigenvectors[(j, i)]);
                 }
                 padded
             })
@@ -87,7 +89,7 @@ impl Projected {
         self.points.len() / self.dimensions
     }
 
-    /// One window's numbers.
+    /// Components of one window.
     #[inline]
     pub(crate) fn point(&self, i: usize) -> &[f32] {
         &self.points[i * self.dimensions..(i + 1) * self.dimensions]

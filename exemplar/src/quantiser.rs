@@ -1,12 +1,12 @@
 //! Tree-structured vector quantisation: a binary tree of mean windows.
 
 use crate::level::Level;
-use crate::search::weighted_distance;
-use crate::window::Window;
+use crate::numbers::single;
+use crate::window::{Window, weighted_distance};
 
-/// Windows in a leaf, and rounds of two-means a split.
+/// Windows in a leaf, and iterations of two-means per split.
 const LEAF: usize = 8;
-const ROUNDS: usize = 6;
+const ITERATIONS: usize = 6;
 
 /// The tree of one exemplar's windows.
 pub(crate) struct Quantiser {
@@ -24,7 +24,7 @@ enum Node {
 }
 
 impl Quantiser {
-    /// Splits the windows about `places` in two by two-means, and each part again, until parts are small.
+    /// Splits the windows about `places` recursively in two by two-means until the parts are small.
     ///
     /// # References
     ///
@@ -49,7 +49,7 @@ impl Quantiser {
         if last - first <= LEAF {
             return node;
         }
-        // The two means start at the window farthest from the mean, and at that farthest from it.
+        // The two means start at the window farthest from the mean, and at the window farthest from that one.
         let members = self.places[first..last].to_vec();
         let mut buffer = vec![0.0; self.length];
         let mut farthest = |from: &[f32]| {
@@ -68,7 +68,7 @@ impl Quantiser {
         let one = farthest(&mean);
         let mut means = [farthest(&one), one];
         let mut parts = [Vec::new(), Vec::new()];
-        for _ in 0..ROUNDS {
+        for _ in 0..ITERATIONS {
             parts = [Vec::new(), Vec::new()];
             for &place in &members {
                 window.copy(level, place as usize, &mut buffer);
@@ -81,7 +81,7 @@ impl Quantiser {
             means = [0, 1].map(|i: usize| self::mean(level, window, &parts[i]));
         }
         if parts.iter().any(Vec::is_empty) {
-            // All windows alike.
+            // All windows are equal.
             return node;
         }
         let middle = first + parts[0].len();
@@ -93,7 +93,7 @@ impl Quantiser {
         node
     }
 
-    /// The places of the leaf that a window falls into, always to the nearer mean.
+    /// The places of the leaf that is reached by descending to the nearer mean.
     pub(crate) fn leaf(&self, window: &[f32], weights: &[f32]) -> &[u32] {
         let mut node = 0;
         loop {
@@ -121,5 +121,5 @@ fn mean(level: &Level, window: &Window, places: &[u32]) -> Vec<f32> {
         window.copy(level, place as usize, &mut buffer);
         sum.iter_mut().zip(&buffer).for_each(|(s, &v)| *s += f64::from(v));
     }
-    sum.into_iter().map(|s| (s / places.len() as f64) as f32).collect()
+    sum.into_iter().map(|s| single(s / places.len() as f64)).collect()
 }

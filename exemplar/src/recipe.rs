@@ -1,8 +1,8 @@
-//! What tells the methods apart.
+//! Parameters in which the methods differ.
 
-use crate::{Method, SolidOptions, Solver};
+use crate::options::{Method, SolidOptions, Solver};
 
-/// How a voxel's value is made from its votes.
+/// How a voxel's value is computed from its votes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Combine {
     /// Their plain mean.
@@ -13,31 +13,32 @@ pub(crate) enum Combine {
     Discrete,
 }
 
-/// A method's parts.
+/// Parameters of a method.
 #[derive(Clone, Debug)]
 pub(crate) struct Recipe {
     pub(crate) combine: Combine,
-    /// Votes for a colour are multiplied by (expected / found)^this; 0 without a colour histogram.
+    /// Exponent c: votes for a colour are multiplied by (expected / found)^c; 0 without a colour histogram.
     pub(crate) colour: f32,
-    /// Votes for a pixel used k times too often are divided by 1 + this k; 0 without a position histogram.
+    /// Factor c: votes for a pixel used k times too often are divided by 1 + c k; 0 without a position histogram.
     pub(crate) position: f32,
-    /// A neighbourhood used k times too often costs this k spreads more; 0 without an index histogram.
+    /// Factor c: the price of a neighbourhood used k times too often is c k times the variance of a window; 0 without
+    /// an index histogram.
     pub(crate) index: f32,
-    /// Similar pixels a pixel.
+    /// Similar pixels per pixel.
     pub(crate) similar: usize,
-    /// Neighbourhoods this far away vote, at first and at last.
+    /// Distance of the neighbourhoods that vote, in the first and in the last iteration.
     pub(crate) radii: [usize; 2],
-    /// Weight of a vote from the next voxel, when those within 1 vote; 1 from the voxel itself.
+    /// Weight of a vote from a neighbouring voxel when the radius is 1; that of the voxel itself is 1.
     pub(crate) edge: f32,
-    /// Exemplars are thinned out with the solid.
+    /// Whether exemplars are subsampled with the solid.
     pub(crate) thinned: bool,
 }
 
 impl Recipe {
-    /// The method's recipe; `phases` are kept sharp to the end.
+    /// The method's parameters; for `phases` the last votes come from the voxel itself.
     pub(crate) fn new(options: &SolidOptions, phases: bool) -> Self {
         let half = options.neighbourhood / 2;
-        // Kopf's solver lets every neighbourhood that covers a voxel vote; urs-2012's the voxel's own.
+        // In Kopf's solver every neighbourhood that contains a voxel votes; in that of urs-2012 only the voxel's own.
         let radius = match options.solver() {
             Solver::Batch => half,
             Solver::Sequential => 0,
@@ -81,7 +82,7 @@ impl Recipe {
         }
     }
 
-    /// How far away votes come from in an iteration: shrinking evenly in the last half.
+    /// Distance of the neighbourhoods that vote in an iteration; it decreases evenly in the last half.
     pub(crate) fn radius(&self, iteration: usize, iterations: usize) -> usize {
         let [first, last] = self.radii;
         let left = iterations - iteration - 1;
@@ -97,10 +98,10 @@ impl Recipe {
 #[cfg(test)]
 mod tests {
     use super::Recipe;
-    use crate::SolidOptions;
+    use crate::options::SolidOptions;
 
     #[test]
-    fn votes_come_from_ever_nearer() {
+    fn the_radius_of_votes_decreases() {
         let recipe = Recipe::new(&SolidOptions::default(), true);
         let radii: Vec<usize> = (0..10).map(|i| recipe.radius(i, 10)).collect();
         assert_eq!(radii, [2, 2, 2, 2, 2, 2, 2, 1, 1, 0]);

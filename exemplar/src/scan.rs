@@ -4,16 +4,18 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use crate::numbers::number;
+
 /// An order of voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scan {
     /// x fastest, then y, then z.
     Lexicographic,
-    /// Every order alike.
+    /// A random order.
     Random,
     /// Z-curve: bits of z, y, x interleaved.
     Morton,
-    /// Hilbert's curve, generalised to any box: nearly every step goes to a neighbour. The default.
+    /// Hilbert's curve generalised to any box, the default: nearly every step goes to a neighbour.
     #[default]
     Hilbert,
 }
@@ -21,11 +23,12 @@ pub enum Scan {
 impl Scan {
     /// All voxels of a box of `size` (nz, ny, nx), each once, as (z ny + y) nx + x.
     ///
-    /// Hilbert's curve steps to one of the 6 neighbours if all sides are even; with odd sides some steps are diagonal or pass over a voxel or two.
+    /// Hilbert's curve steps to one of the 6 neighbours if all sides are even; with odd sides some steps are diagonal
+    /// or skip one or two voxels. The box must have fewer than 2^31 voxels.
     ///
     /// # References
     ///
-    /// urs-2012, section 2.4; Hilbert for any box: Červený's generalised curve (gilbert).
+    /// urs-2012, section 2.4; the curve for any box: Červený's generalised curve (gilbert).
     ///
     /// # Examples
     ///
@@ -40,9 +43,9 @@ impl Scan {
     pub fn order(self, size: [usize; 3], seed: u64) -> Vec<u32> {
         let n = size.iter().product::<usize>();
         match self {
-            Self::Lexicographic => (0..n as u32).collect(),
+            Self::Lexicographic => (0..number(n)).collect(),
             Self::Random => {
-                let mut order: Vec<u32> = (0..n as u32).collect();
+                let mut order: Vec<u32> = (0..number(n)).collect();
                 order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
                 order
             }
@@ -56,13 +59,13 @@ fn morton([nz, ny, nx]: [usize; 3]) -> Vec<u32> {
     let mut order = Vec::with_capacity(nz * ny * nx);
     let side = nz.max(ny).max(nx).next_power_of_two();
     let mut open = vec![([0, 0, 0], side)];
-    // Octants are taken from the stack in the order of their numbers; those wholly outside are left out.
+    // Octants come from the stack in the order of their numbers; those wholly outside are skipped.
     while let Some(([z, y, x], side)) = open.pop() {
         if z >= nz || y >= ny || x >= nx {
             continue;
         }
         if side == 1 {
-            order.push(((z * ny + y) * nx + x) as u32);
+            order.push(number((z * ny + y) * nx + x));
             continue;
         }
         let half = side / 2;
@@ -84,7 +87,8 @@ fn hilbert([nz, ny, nx]: [usize; 3]) -> Vec<u32> {
     };
     let (x, y, z) = (along(2, nx), along(1, ny), along(0, nz));
     let mut path = Vec::with_capacity(nz * ny * nx);
-    let mut visit = |[z, y, x]: Step| path.push(((z as usize * ny + y as usize) * nx + x as usize) as u32);
+    #[allow(clippy::cast_possible_truncation, reason = "places of the box are not negative")]
+    let mut visit = |[z, y, x]: Step| path.push(number((z as usize * ny + y as usize) * nx + x as usize));
     if nx >= ny && nx >= nz {
         curve([0; 3], x, y, z, &mut visit);
     } else if ny >= nx && ny >= nz {
@@ -113,7 +117,7 @@ fn curve(p: Step, a: Step, b: Step, c: Step, visit: &mut impl FnMut(Step)) {
             return;
         }
     }
-    // Halves, of even length where there is a choice.
+    // Halves, of even length if possible.
     let half = |v: Step| {
         let half = v.map(|i| i.div_euclid(2));
         if length(half) % 2 == 1 && length(v) > 2 {
@@ -152,6 +156,7 @@ fn curve(p: Step, a: Step, b: Step, c: Step, visit: &mut impl FnMut(Step)) {
 #[cfg(test)]
 mod tests {
     use super::Scan;
+    use crate::numbers::number;
     use proptest::prelude::*;
 
     fn steps(size: [usize; 3]) -> Vec<[usize; 3]> {
@@ -172,7 +177,7 @@ mod tests {
             for scan in [Scan::Lexicographic, Scan::Random, Scan::Morton, Scan::Hilbert] {
                 let mut order = scan.order([nz, ny, nx], seed);
                 order.sort_unstable();
-                prop_assert_eq!(order, (0..(nz * ny * nx) as u32).collect::<Vec<_>>());
+                prop_assert_eq!(order, (0..number(nz * ny * nx)).collect::<Vec<_>>());
             }
         }
 
@@ -200,7 +205,7 @@ mod tests {
         for (code, &at) in order.iter().enumerate() {
             let spread = |i: u32| (0..3).map(|bit| (i >> bit & 1) << (3 * bit)).sum::<u32>();
             let (z, y, x) = (at / 64, at / 8 % 8, at % 8);
-            assert_eq!(code as u32, spread(z) << 2 | spread(y) << 1 | spread(x));
+            assert_eq!(number(code), spread(z) << 2 | spread(y) << 1 | spread(x));
         }
     }
 }

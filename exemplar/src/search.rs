@@ -1,7 +1,7 @@
-//! The exemplar's neighbourhood most like one of the solid.
+//! Search for the neighbourhood of the exemplar that is most similar to one of the solid.
 
-use crate::Search;
-use crate::level::{Atlas, LANES, Level, NONE};
+use crate::level::{Atlas, Level, NONE};
+use crate::options::Search;
 use crate::quantiser::Quantiser;
 use crate::similar::Similar;
 use crate::window::Window;
@@ -12,9 +12,9 @@ pub(crate) struct Query<'a> {
     pub(crate) window: &'a [f32],
     /// Which of its pixels count.
     pub(crate) weights: &'a [f32],
-    /// All pixels of a window over those that count: makes distances comparable.
+    /// Number of pixels of a window over the number that count, which makes distances comparable.
     pub(crate) scale: f32,
-    /// The exemplar in which to look.
+    /// Number of the exemplar to search.
     pub(crate) sheet: usize,
 }
 
@@ -32,7 +32,7 @@ enum Way {
 }
 
 impl<'a> Finder<'a> {
-    /// Learns what the search needs to know of the exemplars.
+    /// Prepares the search.
     pub(crate) fn new(search: Search, level: &'a Level, atlas: &Atlas, window: &'a Window, similar: usize) -> Self {
         let way = match search {
             Search::Exact => Way::Exact,
@@ -48,8 +48,8 @@ impl<'a> Finder<'a> {
         Self { level, window, way }
     }
 
-    /// Place and squared distance of the window that costs least: distance and `price`. `bases` are the present match and
-    /// those that continue the neighbours' matches; only [`Search::KCoherence`] looks at all of them.
+    /// Place and squared distance of the window with the smallest cost, squared distance plus `price`. `bases` are the
+    /// present match and the continuations of the neighbours' matches; only [`Search::KCoherence`] uses all of them.
     #[inline]
     pub(crate) fn nearest(&self, query: &Query<'_>, bases: &[usize], price: impl Fn(usize) -> f32) -> (usize, f32) {
         let mut best = Best {
@@ -106,22 +106,4 @@ struct Best {
     place: usize,
     distance: f32,
     cost: f32,
-}
-
-/// Sum of squared differences where `weights` count; channels of `a` and `b` one after the other.
-#[inline]
-pub(crate) fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let ((a, _), (b, _), (weights, _)) = (
-        a.as_chunks::<LANES>(),
-        b.as_chunks::<LANES>(),
-        weights.as_chunks::<LANES>(),
-    );
-    for ((a, b), w) in a.iter().zip(b).zip(weights.iter().cycle()) {
-        for lane in 0..LANES {
-            let d = a[lane] - b[lane];
-            sums[lane] += d * d * w[lane];
-        }
-    }
-    sums.iter().sum()
 }

@@ -1,18 +1,19 @@
-//! Voxel by voxel along a scan: each sees what was written before it.
+//! The sequential solver: voxel by voxel along a scan, each using the values written before it.
 
 use std::ops::ControlFlow;
 
 use crate::batch::{NEIGHBOURS, within};
 use crate::field::{Field, VIEWS, sheet_of};
+use crate::numbers::{number, single};
 use crate::search::Query;
 use crate::stage::{R, Stage, Tallies, Votes};
 
-/// Voxels between two looks at the progress.
+/// Voxels between two progress reports.
 const STRIDE: usize = 1 << 14;
 
 impl Stage<'_> {
-    /// One iteration; mean energy of a neighbourhood when it was visited, and the number of matches that changed. `go_on` is
-    /// told how much of the iteration is done; a break ends it.
+    /// Runs one iteration and returns the mean energy of a neighbourhood when it was visited and the number of matches
+    /// that changed. `go_on` receives the completed fraction and can cancel the iteration.
     ///
     /// # References
     ///
@@ -57,25 +58,25 @@ impl Stage<'_> {
                 let here = field.in_view(view, at);
                 self.continued(field, view, at, &mut bases);
                 let usage = &tallies.indices[view];
-                // What is used too often is dearer, in proportion.
-                let price = |place: usize| match usage.of(place as u32) {
+                // The price is proportional to the overuse.
+                let price = |place: usize| match usage.of(number(place)) {
                     Some((count, target)) if self.recipe.index > 0.0 => {
-                        self.recipe.index * self.spread * (count / target - 1.0).clamp(0.0, 20.0) as f32
+                        self.recipe.index * self.spread * single((count / target - 1.0).clamp(0.0, 20.0))
                     }
                     _ => 0.0,
                 };
                 let (place, distance) = self.finder.nearest(&query, &bases, price);
-                let old = std::mem::replace(&mut field.matches[view][here], place as u32);
+                let old = std::mem::replace(&mut field.matches[view][here], number(place));
                 if old as usize != place {
                     changed += 1;
                     tallies.indices[view].add(old, -1);
-                    tallies.indices[view].add(place as u32, 1);
+                    tallies.indices[view].add(number(place), 1);
                 }
                 field.gaps[view][here] = distance;
                 energy += f64::from(distance.powf(R / 2.0));
                 visited += 1;
                 let weight = (distance + 1e-3 * self.spread).powf(R / 2.0 - 1.0);
-                votes.push(place as u32, weight * self.multiplier(tallies, voxels, place as u32));
+                votes.push(number(place), weight * self.multiplier(tallies, voxels, number(place)));
             }
             let source = self.combine(&votes, &mut value);
             self.write(field, tallies, voxel, source, &value);
@@ -83,7 +84,7 @@ impl Stage<'_> {
         ControlFlow::Continue((energy / visited.max(1) as f64, changed))
     }
 
-    /// The present match, and those that continue the neighbours'.
+    /// The present match, and the continuations of the neighbours' matches.
     fn continued(&self, field: &Field, view: usize, at: [usize; 3], bases: &mut Vec<usize>) {
         let [_, rows, columns] = VIEWS[view];
         let sheet = sheet_of(view, self.level.windows.len());
@@ -107,7 +108,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Copies the window about a voxel; tells how many of its pixels count where the solid is bounded.
+    /// Copies the window about a voxel; in a bounded solid it returns the number of its pixels that count.
     fn look(&self, field: &Field, view: usize, at: [usize; 3], into: &mut [f32], weights: &mut [f32]) -> Option<f32> {
         let window = self.window;
         let half = window.half as isize;

@@ -1,15 +1,16 @@
-//! For each pixel of an exemplar the k others whose neighbourhoods look most like its own.
+//! The k pixels whose neighbourhoods are most similar to that of each pixel of an exemplar.
 
 use rayon::prelude::*;
 
 use crate::level::{Atlas, Level, NONE};
+use crate::numbers::number;
 use crate::principal::Projected;
 use crate::window::Window;
 
-/// Share of the variance of windows that their projection keeps, and most components.
-const SHARE: f64 = 0.95;
+/// Fraction of the variance of windows that their projection keeps, and most components.
+const KEPT: f64 = 0.95;
 const COMPONENTS: usize = 12;
-/// Windows in a leaf of the tree, and leaves looked at for a query.
+/// Windows in a leaf of the tree, and leaves visited per query.
 const LEAF: usize = 12;
 const LEAVES: usize = 24;
 
@@ -20,14 +21,15 @@ pub(crate) struct Similar {
 }
 
 impl Similar {
-    /// Learns them for all exemplars of a level. Places within half a window of each other are too alike to count.
+    /// Finds them for all exemplars of a level. Places within half a window of each other are excluded, since their
+    /// windows overlap.
     pub(crate) fn learn(level: &Level, atlas: &Atlas, window: &Window, k: usize) -> Self {
         let mut places = vec![NONE; level.pixel.len() * k];
         if k == 0 {
             return Self { k, places };
         }
         for (sheet, windows) in level.windows.iter().enumerate() {
-            let projected = Projected::new(level, sheet, window, SHARE, COMPONENTS);
+            let projected = Projected::new(level, sheet, window, KEPT, COMPONENTS);
             let tree = Tree::new(&projected);
             let located: Vec<(usize, usize)> = windows
                 .iter()
@@ -58,7 +60,7 @@ impl Similar {
         Self { k, places }
     }
 
-    /// Places like this one, the most similar first.
+    /// Places similar to this one, the most similar first.
     #[inline]
     pub(crate) fn of(&self, place: usize) -> &[u32] {
         &self.places[place * self.k..(place + 1) * self.k]
@@ -80,7 +82,7 @@ impl Tree {
     fn new(projected: &Projected) -> Self {
         let mut tree = Self {
             nodes: Vec::new(),
-            order: (0..projected.len() as u32).collect(),
+            order: (0..number(projected.len())).collect(),
         };
         let n = tree.order.len();
         tree.grow(projected, 0, n);
@@ -88,10 +90,10 @@ impl Tree {
     }
 
     fn grow(&mut self, projected: &Projected, first: usize, last: usize) -> u32 {
-        let node = self.nodes.len() as u32;
+        let node = number(self.nodes.len());
         self.nodes.push(Node::Leaf {
-            first: first as u32,
-            last: last as u32,
+            first: number(first),
+            last: number(last),
         });
         if last - first <= LEAF {
             return node;
@@ -117,7 +119,7 @@ impl Tree {
         let left = self.grow(projected, first, first + middle);
         let right = self.grow(projected, first + middle, last);
         self.nodes[node as usize] = Node::Split {
-            axis: axis as u32,
+            axis: number(axis),
             at,
             left,
             right,
@@ -125,8 +127,8 @@ impl Tree {
         node
     }
 
-    /// The `k` nearest windows to window `i` that `counts` accepts beside those kept already, looking into the [`LEAVES`] most
-    /// promising leaves.
+    /// The `k` nearest windows to window `i` that `counts` accepts beside those already kept, in the [`LEAVES`] nearest
+    /// leaves.
     fn nearest(
         &self,
         projected: &Projected,
@@ -136,7 +138,7 @@ impl Tree {
     ) -> Vec<u32> {
         let query = projected.point(i);
         let mut seen: Vec<(f32, u32)> = Vec::new();
-        // Subtrees still to be looked into, with a bound of their distance.
+        // Open subtrees, with a lower bound of their distance.
         let mut open: Vec<(f32, u32)> = vec![(0.0, 0)];
         let mut leaves = 0;
         while leaves < LEAVES {

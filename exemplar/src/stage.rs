@@ -1,7 +1,9 @@
-//! One level of the synthesis: what stays the same during its iterations, and the histograms that do not.
+//! One level of the synthesis: its constants, and the histograms that its iterations update.
 
 use crate::field::{Field, sheet_of};
 use crate::level::{Atlas, Level, NONE};
+use crate::numbers::single;
+use crate::options::Search;
 use crate::recipe::{Combine, Recipe};
 use crate::search::Finder;
 use crate::tallies::{Colours, Usage};
@@ -10,26 +12,26 @@ use crate::window::Window;
 /// Exponent of the energy: |difference|^r.
 pub(crate) const R: f32 = 0.8;
 
-/// What stays the same.
+/// The constants of a level.
 pub(crate) struct Stage<'a> {
     pub(crate) level: &'a Level,
     pub(crate) atlas: &'a Atlas,
     pub(crate) window: &'a Window,
     pub(crate) finder: Finder<'a>,
     pub(crate) recipe: &'a Recipe,
-    /// Channels that are no features.
+    /// Channels that are not features.
     pub(crate) colours: usize,
     /// Sum over a window and its channels of the exemplars' variance.
     pub(crate) spread: f32,
 }
 
-/// Histograms of the solid as it stands.
+/// Histograms of the present solid.
 pub(crate) struct Tallies {
     /// Use of the exemplars' pixels by voxels.
     pub(crate) positions: Usage,
     /// Use of the exemplars' windows by the neighbourhoods of each view.
     pub(crate) indices: Vec<Usage>,
-    /// What a window costs, by bin of its usage.
+    /// Price of a window, by bin of its usage.
     pub(crate) prices: Vec<Vec<f32>>,
     pub(crate) colours: Colours,
 }
@@ -59,7 +61,7 @@ impl<'a> Stage<'a> {
         atlas: &'a Atlas,
         window: &'a Window,
         recipe: &'a Recipe,
-        search: crate::Search,
+        search: Search,
         colours: usize,
     ) -> Self {
         Self {
@@ -73,7 +75,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Counts the solid as it stands.
+    /// The histograms of the present solid.
     pub(crate) fn tally(&self, field: &Field) -> Tallies {
         let views = field.matches.len();
         let exemplars = self.level.windows.len();
@@ -114,7 +116,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// What the histograms make of a vote for each place.
+    /// Factors by which the histograms multiply a vote for each place.
     pub(crate) fn multipliers(&self, tallies: &Tallies, voxels: f64) -> Vec<f32> {
         let mut made = if self.recipe.position > 0.0 {
             tallies
@@ -134,7 +136,7 @@ impl<'a> Stage<'a> {
         made
     }
 
-    /// The same for one place.
+    /// The factor for one place.
     pub(crate) fn multiplier(&self, tallies: &Tallies, voxels: f64, place: u32) -> f32 {
         let mut made = 1.0;
         if let Some((count, target)) = tallies.positions.of(place).filter(|_| self.recipe.position > 0.0) {
@@ -150,10 +152,10 @@ impl<'a> Stage<'a> {
     }
 
     fn overused(&self, count: f64, target: f64) -> f32 {
-        (1.0 / (1.0 + f64::from(self.recipe.position) * (count / target - 1.0).max(0.0))) as f32
+        single(1.0 / (1.0 + f64::from(self.recipe.position) * (count / target - 1.0).max(0.0)))
     }
 
-    /// One voxel's value from its votes; the place it shows, or is nearest to.
+    /// Computes one voxel's value from its votes and returns the place it is copied from, or nearest to.
     pub(crate) fn combine(&self, votes: &Votes, made: &mut [f32]) -> u32 {
         let level = self.level;
         let plain = self.recipe.combine == Combine::Mean;
@@ -189,7 +191,7 @@ impl<'a> Stage<'a> {
         best.2
     }
 
-    /// Writes a voxel and keeps the tallies; given voxels stay.
+    /// Writes a voxel and updates the histograms; fixed voxels are kept.
     pub(crate) fn write(&self, field: &mut Field, tallies: &mut Tallies, voxel: usize, source: u32, value: &[f32]) {
         if !field.is_fixed.is_empty() && field.is_fixed[voxel] {
             return;
@@ -220,5 +222,5 @@ fn spread(level: &Level, window: &Window) -> f32 {
         let mean = values().sum::<f64>() / n;
         sum += values().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
     }
-    sum as f32 * window.count()
+    single(sum) * window.count()
 }

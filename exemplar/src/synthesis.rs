@@ -1,42 +1,49 @@
-//! From exemplars to a solid: levels from coarse to fine.
+//! Synthesis of a solid from exemplars, from coarse to fine levels.
 
 use std::ops::ControlFlow;
 
 use ndarray::{Array3, Array4, ArrayView3};
 
+use stereology_metrics::Progress;
+
+use crate::domain::Domain;
+use crate::error::SolidError;
+use crate::exemplar::Exemplar;
 use crate::feature_size::levels_for;
 use crate::field::Field;
 use crate::iteration::Iteration;
 use crate::level::{Atlas, Level, NONE, smoothed};
+use crate::numbers::number as numbered;
+use crate::options::{SolidOptions, Solver};
 use crate::recipe::{Combine, Recipe};
 use crate::stage::Stage;
 use crate::window::Window;
-use crate::{Domain, Exemplar, SolidError, SolidOptions, Solver};
 
-/// What happened at one level.
+/// Report of one level.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LevelReport {
     /// Voxels along z, y, x.
     pub size: [usize; 3],
-    /// Mean over the neighbourhoods of |difference from the exemplar's nearest|^0.8, in each iteration. Methods that use all
-    /// neighbourhoods alike pay for it: compare energies of one method only.
+    /// Mean over the neighbourhoods of |difference from the most similar one of the exemplar|^0.8, in each iteration.
+    /// Methods that use all neighbourhoods equally often have higher energies, so compare energies of one method only.
     pub energies: Vec<f64>,
 }
 
-/// A solid and how it was made.
+/// A solid and the report of its synthesis.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Solid {
-    /// Values (z, y, x, channel); 0 outside the mask. Phases are their numbers.
+    /// Values (z, y, x, channel); 0 outside the mask. For phases these are their numbers.
     pub values: Array4<f32>,
-    /// Which pixel each voxel shows or is nearest to, exemplars one after the other, row by row; [`u32::MAX`] outside the mask.
+    /// The pixel from which each voxel is copied, or to which it is nearest: exemplars one after the other, row by row;
+    /// [`u32::MAX`] outside the mask.
     pub sources: Array3<u32>,
     /// Levels, the coarsest first.
     pub levels: Vec<LevelReport>,
-    /// Share of the exemplars' pixels that the solid shows.
+    /// Fraction of the exemplars' pixels that the solid uses.
     pub coverage: f64,
-    /// exp(entropy) of the use of the exemplars' pixels, over their number: 1 if all are used alike.
+    /// exp(entropy) of the use of the exemplars' pixels, over their number: 1 if all are used equally often.
     pub perplexity: f64,
     /// Voxels written, over all iterations and levels.
     pub voxel_iterations: u64,
@@ -44,17 +51,18 @@ pub struct Solid {
 
 /// A solid whose slices look like the exemplars.
 ///
-/// Slices of constant y look like the first exemplar (its rows along z, its columns along x), those of constant x like the
-/// second (rows along z, columns along y), and with [`Views::Three`](crate::Views::Three) those of constant z like the third
-/// (rows along y, columns along x). One exemplar stands for all; two for y and x, the second for z too.
+/// Slices of constant y look like the first exemplar (its rows along z, its columns along x), those of constant x like
+/// the second (rows along z, columns along y), and with [`Views::Three`](crate::Views::Three) those of constant z like
+/// the third (rows along y, columns along x). One exemplar serves all directions; of two, the second serves x and z.
 ///
-/// Time: 1 to 3 microseconds a voxel, iteration and core for [`Method::Best`](crate::Method::Best) with one channel, by the number
-/// of views. Memory: 8 bytes a voxel and view, and 4 more a voxel for its source and for each channel.
+/// Time: 1 to 3 microseconds per voxel, iteration and core for [`Method::Best`](crate::Method::Best) with one channel,
+/// by the number of views. Memory: 8 bytes per voxel and view, and 4 bytes per voxel for its source and for each
+/// channel.
 ///
 /// # Errors
 ///
-/// [`SolidError`]: exemplars that are too few, too many, too small, of different channels; options out of range; given voxels that the exemplars cannot
-/// hold; a progress function that says break.
+/// [`SolidError`]: too few, too many or too small exemplars, or different channels; options out of range; fixed voxels
+/// with values that the exemplars do not have; a cancelled run.
 ///
 /// # References
 ///
@@ -72,7 +80,8 @@ pub struct Solid {
 /// let options = SolidOptions::default().with_views(Views::Two).with_iterations(4);
 /// let solid = synthesize_solid(&[exemplar], &Domain::new([24; 3])?, &options, &|_| ControlFlow::Continue(()))?;
 /// let step = |dz: usize, dx: usize| -> f32 {
-///     solid.values.indexed_iter().map(|((z, y, x, c), v)| (v - solid.values[[(z + dz) % 24, y, (x + dx) % 24, c]]).abs()).sum()
+///     let moved = |z: usize, y: usize, x: usize| solid.values[[(z + dz) % 24, y, (x + dx) % 24, 0]];
+///     solid.values.indexed_iter().map(|((z, y, x, _), v)| (v - moved(z, y, x)).abs()).sum()
 /// };
 /// assert!(step(1, 0) > 2.0 * step(0, 1), "values change across the layers, not along them");
 /// # Ok::<(), stereology_exemplar::SolidError>(())
@@ -81,12 +90,12 @@ pub fn synthesize_solid(
     exemplars: &[Exemplar],
     domain: &Domain,
     options: &SolidOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Solid, SolidError> {
     synthesize(exemplars, domain, options, None, progress, &mut |_| ())
 }
 
-/// [`synthesize_solid`], which shows `watch` the solid after each iteration of each level.
+/// [`synthesize_solid`] that passes the solid to `watch` after each iteration of each level.
 ///
 /// # Errors
 ///
@@ -94,7 +103,7 @@ pub fn synthesize_solid(
 ///
 /// # Examples
 ///
-/// How contrast grows from iteration to iteration (urs-2012, figure 7):
+/// Contrast after each iteration (urs-2012, figure 7):
 ///
 /// ```
 /// use ndarray::Array2;
@@ -104,7 +113,9 @@ pub fn synthesize_solid(
 /// let layers = Array2::from_shape_fn((32, 32), |(z, x)| 0.5 + 0.4 * (0.9 * z as f32 + (0.2 * x as f32).sin()).sin());
 /// let mut deviations = Vec::new();
 /// let options = SolidOptions::default().with_iterations(3).with_levels(2);
-/// synthesize_solid_watched(&[Exemplar::grey(layers.view())?], &Domain::new([12; 3])?, &options, &|_| ControlFlow::Continue(()), &mut |now| {
+/// let (exemplar, domain) = ([Exemplar::grey(layers.view())?], Domain::new([12; 3])?);
+/// let go = |_: f64| ControlFlow::Continue(());
+/// synthesize_solid_watched(&exemplar, &domain, &options, &go, &mut |now| {
 ///     deviations.push((now.coarser_by, now.number, now.values().std(0.0)));
 /// })?;
 /// assert_eq!(deviations.len(), 6);
@@ -115,19 +126,19 @@ pub fn synthesize_solid_watched(
     exemplars: &[Exemplar],
     domain: &Domain,
     options: &SolidOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
     watch: &mut dyn FnMut(&Iteration<'_>),
 ) -> Result<Solid, SolidError> {
     synthesize(exemplars, domain, options, None, progress, watch)
 }
 
-/// A solid whose slices look like the exemplars; `begin` are the pixels that its voxels show at first, random ones if `None`.
+/// Synthesises a solid; its voxels start with the pixels `begin`, or with random ones if `None`.
 pub(crate) fn synthesize(
     exemplars: &[Exemplar],
     domain: &Domain,
     options: &SolidOptions,
     begin: Option<ArrayView3<'_, u32>>,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
     watch: &mut dyn FnMut(&Iteration<'_>),
 ) -> Result<Solid, SolidError> {
     check(exemplars, domain, options)?;
@@ -167,7 +178,7 @@ pub(crate) fn synthesize(
         );
         let mut tallies = stage.tally(&field);
         let mut energies = Vec::new();
-        let share = voxels_of(number) / all / options.iterations as f64;
+        let fraction = voxels_of(number) / all / options.iterations as f64;
         let order = match options.solver() {
             Solver::Sequential => options.scan.order(field.size, options.seed),
             Solver::Batch => Vec::new(),
@@ -184,17 +195,19 @@ pub(crate) fn synthesize(
             let mut unchanged = false;
             match options.solver() {
                 Solver::Batch => {
-                    let go_on = |part: f64| progress(done + part * share * 0.75);
+                    let go_on = |part: f64| progress(done + part * fraction * 0.75);
                     let ControlFlow::Continue(energy) = stage.search(&mut field, &mut tallies, iteration, &go_on)
                     else {
                         return Err(SolidError::Cancelled);
                     };
                     energies.push(energy);
-                    cancelled(progress(done + share * 0.75))?;
+                    cancelled(progress(done + fraction * 0.75))?;
                     stage.vote(&mut field, &mut tallies, recipe.radius(iteration, options.iterations));
                 }
                 Solver::Sequential => {
-                    let swept = stage.sweep(&mut field, &mut tallies, &order, &|part| progress(done + part * share));
+                    let swept = stage.sweep(&mut field, &mut tallies, &order, &|part| {
+                        progress(done + part * fraction)
+                    });
                     match swept {
                         ControlFlow::Continue((energy, changed)) => {
                             energies.push(energy);
@@ -212,7 +225,7 @@ pub(crate) fn synthesize(
                 colours: exemplars[0].inner_colours(),
             });
             voxel_iterations += field.voxels() as u64;
-            done += share;
+            done += fraction;
             if unchanged {
                 break;
             }
@@ -246,7 +259,7 @@ pub(crate) fn synthesize(
     unreachable!("there is at least one level, and the last one returns")
 }
 
-/// The result, from the finest level; `labels` of phases instead of values.
+/// The result of the finest level; phases have `labels` instead of values.
 fn finished(
     field: Field,
     level: &Level,
@@ -294,7 +307,7 @@ fn finished(
     }
 }
 
-/// What can be checked before anything is made.
+/// Checks of all inputs.
 fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Result<(), SolidError> {
     if exemplars.is_empty() || exemplars.len() > 3 {
         return Err(SolidError::Exemplars { found: exemplars.len() });
@@ -303,13 +316,13 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
     if side.is_multiple_of(2) || !(3..=15).contains(&side) {
         return Err(SolidError::Neighbourhood { side });
     }
-    let in_range = |option, value: usize, range: std::ops::RangeInclusive<usize>, said| {
+    let in_range = |option, value: usize, range: std::ops::RangeInclusive<usize>, text| {
         if range.contains(&value) {
             Ok(())
         } else {
             Err(SolidError::Option {
                 option,
-                range: said,
+                range: text,
                 asked: value,
             })
         }
@@ -318,7 +331,7 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
     in_range("similar pixels", options.similar.unwrap_or(1), 0..=64, "at most 64")?;
     if options.causal && options.solver() == Solver::Batch {
         return Err(SolidError::Mismatch {
-            what: "causal neighbourhoods are for the sequential solver: the batch solver has no before and after"
+            what: "causal neighbourhoods are for the sequential solver: the batch solver visits voxels in no order"
                 .to_owned(),
         });
     }
@@ -336,7 +349,7 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         if other.phases() != first.phases() {
             return Err(SolidError::Mismatch {
                 what: format!(
-                    "the exemplars must show the same phases, but have {:?} and {:?}",
+                    "the exemplars must have the same phases, but have {:?} and {:?}",
                     first.phases().unwrap_or_default(),
                     other.phases().unwrap_or_default()
                 ),
@@ -363,7 +376,7 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
     Ok(())
 }
 
-/// Levels to use.
+/// Number of levels.
 fn levels(
     exemplars: &[Exemplar],
     domain: &Domain,
@@ -404,7 +417,7 @@ fn levels(
     }
 }
 
-/// The solid at a level, before anything is in it but what is given.
+/// The initial state of the solid at a level: only the fixed voxels have values.
 fn field_at(domain: &Domain, number: usize, exemplars: &[Exemplar], level: &Level) -> Field {
     let step = 1_usize << number;
     let size = domain.size().map(|n| n.div_ceil(step));
@@ -431,11 +444,11 @@ fn field_at(domain: &Domain, number: usize, exemplars: &[Exemplar], level: &Leve
     if domain.fixed().is_empty() {
         return field;
     }
-    // A coarse voxel is given the mean of what is given in it.
+    // A coarse voxel gets the mean of the fixed voxels in it.
     let mut sums: std::collections::BTreeMap<u32, (Vec<f32>, f32)> = std::collections::BTreeMap::new();
     for (at, value) in domain.fixed() {
         let inner = inner_value(&exemplars[0], value);
-        let voxel = field.index(at.map(|i| i / step)) as u32;
+        let voxel = numbered(field.index(at.map(|i| i / step)));
         let entry = sums.entry(voxel).or_insert_with(|| (vec![0.0; inner.len()], 0.0));
         entry.0.iter_mut().zip(&inner).for_each(|(sum, v)| *sum += v);
         entry.1 += 1.0;
@@ -444,7 +457,7 @@ fn field_at(domain: &Domain, number: usize, exemplars: &[Exemplar], level: &Leve
     for (voxel, (sum, count)) in sums {
         let mut value: Vec<f32> = sum.iter().map(|sum| sum / count).collect();
         let place = nearest_place(level, &value);
-        // Features nobody measured are those of the most similar pixel.
+        // Features of fixed voxels are those of the most similar pixel.
         value.extend((value.len()..channels).map(|channel| level.value(channel, place)));
         field.sources[voxel as usize] = place;
         field.is_fixed[voxel as usize] = true;
@@ -453,7 +466,7 @@ fn field_at(domain: &Domain, number: usize, exemplars: &[Exemplar], level: &Leve
     field
 }
 
-/// A given value in the channels that are compared.
+/// The value of a fixed voxel in the channels that are compared.
 fn inner_value(exemplar: &Exemplar, value: &[f32]) -> Vec<f32> {
     match exemplar.phases() {
         None => value.to_vec(),
@@ -465,7 +478,7 @@ fn inner_value(exemplar: &Exemplar, value: &[f32]) -> Vec<f32> {
     }
 }
 
-/// Is this value the phase's number?
+/// Whether this value is the number of the phase.
 fn is_phase(value: f32, phase: u32) -> bool {
     #[allow(clippy::float_cmp, reason = "numbers of phases are whole")]
     let same = value == phase as f32;

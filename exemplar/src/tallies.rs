@@ -1,25 +1,27 @@
-//! Histograms that keep the solid's colours, and the use it makes of the exemplars, like the exemplars'.
+//! Histograms of the solid's colours and of its use of the exemplars, which the synthesis keeps close to those of the
+//! exemplars.
 
 use crate::level::{Atlas, Level, NONE};
+use crate::numbers::{number, single};
 
 /// Bins of a colour channel.
 const BINS: usize = 16;
-/// Fewest voxels to expect in a bin of positions; pixels are pooled in squares until there are so many.
+/// Smallest expected number of voxels in a bin of positions; pixels are pooled in squares until it is reached.
 const FEWEST: f64 = 2.0;
 
-/// How often each pixel of the exemplars, or each of their neighbourhoods, is used.
+/// Use of each pixel of the exemplars, or of each of their neighbourhoods.
 #[derive(Clone)]
 pub(crate) struct Usage {
     /// Bin of each place.
     bins: Vec<u32>,
     /// Uses by bin.
     pub(crate) counts: Vec<i64>,
-    /// Uses to expect by bin.
+    /// Expected uses by bin.
     pub(crate) targets: Vec<f64>,
 }
 
 impl Usage {
-    /// Usage of `members` (places, by exemplar), of which `uses[e]` are to be shared by those of exemplar e.
+    /// Usage of `members` (places, by exemplar); `uses[e]` uses are expected of those of exemplar e together.
     pub(crate) fn new(level: &Level, atlas: &Atlas, members: &[Vec<u32>], uses: &[f64]) -> Self {
         let mut bins = vec![NONE; level.pixel.len()];
         let mut targets = Vec::new();
@@ -50,7 +52,7 @@ impl Usage {
                 }
                 let bin = targets.len() - 1;
                 targets[bin] += each;
-                bins[place as usize] = bin as u32;
+                bins[place as usize] = number(bin);
             }
             debug_assert!(targets.len() > first);
         }
@@ -90,10 +92,10 @@ impl Usage {
         (bin != NONE).then(|| (self.counts[bin as usize] as f64, self.targets[bin as usize]))
     }
 
-    /// Raises the prices of bins that are used too often by up to two steps, lowers those of others by up to one.
+    /// Raises the prices of bins that are used too often by up to two steps and lowers those of others by up to one.
     pub(crate) fn charge(&self, prices: &mut [f32], step: f32) {
         for ((price, &count), &target) in prices.iter_mut().zip(&self.counts).zip(&self.targets) {
-            *price += step * (count as f64 / target - 1.0).clamp(-1.0, 2.0) as f32;
+            *price += step * single((count as f64 / target - 1.0).clamp(-1.0, 2.0));
         }
     }
 
@@ -108,18 +110,18 @@ impl Usage {
 pub(crate) struct Colours {
     ranges: Vec<(f32, f32)>,
     pub(crate) counts: Vec<i64>,
-    /// Share of the exemplars' pixels in each bin.
-    shares: Vec<f64>,
+    /// Fraction of the exemplars' pixels in each bin.
+    fractions: Vec<f64>,
 }
 
 impl Colours {
-    /// Histograms to expect: those of the exemplars' pixels at this level, all exemplars alike.
+    /// The expected histograms: those of the exemplars' pixels at this level, with equal weights of the exemplars.
     pub(crate) fn new(level: &Level, colours: usize) -> Self {
         let all = || level.places.iter().flatten().map(|&place| place as usize);
         let mut made = Self {
             ranges: Vec::new(),
             counts: vec![0; colours * BINS],
-            shares: vec![0.0; colours * BINS],
+            fractions: vec![0.0; colours * BINS],
         };
         for channel in 0..colours {
             let value = |place: usize| level.values[channel * level.stride + place];
@@ -130,7 +132,7 @@ impl Colours {
             for places in &level.places {
                 for &place in places {
                     let bin = made.bin(channel, value(place as usize));
-                    made.shares[bin] += 1.0 / (places.len() * level.places.len()) as f64;
+                    made.fractions[bin] += 1.0 / (places.len() * level.places.len()) as f64;
                 }
             }
         }
@@ -139,6 +141,7 @@ impl Colours {
 
     /// Bin of a value, among those of all channels.
     #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "clamped to the bins")]
     pub(crate) fn bin(&self, channel: usize, value: f32) -> usize {
         let (low, scale) = self.ranges[channel];
         channel * BINS + (((value - low) * scale).max(0.0) as usize).min(BINS - 1)
@@ -157,9 +160,9 @@ impl Colours {
             .collect()
     }
 
-    /// The same of one bin.
+    /// The factor of one bin.
     pub(crate) fn lack_of(&self, bin: usize, voxels: f64, strength: f32) -> f32 {
-        let ratio = (self.shares[bin] * voxels + 1.0) / (self.counts[bin] as f64 + 1.0);
-        (ratio as f32).powf(strength).clamp(1.0 / 16.0, 16.0)
+        let ratio = (self.fractions[bin] * voxels + 1.0) / (self.counts[bin] as f64 + 1.0);
+        single(ratio).powf(strength).clamp(1.0 / 16.0, 16.0)
     }
 }

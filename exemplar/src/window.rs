@@ -1,11 +1,11 @@
-//! Square neighbourhoods: their distance from those of an exemplar.
+//! Square neighbourhoods and their distances.
 
 use crate::level::{LANES, Level};
 
-/// Shape of a neighbourhood: which pixels count, and how they are laid out.
+/// Shape of a neighbourhood: the pixels that count and their layout.
 #[derive(Clone, Debug)]
 pub(crate) struct Window {
-    /// Pixels a side, odd.
+    /// Pixels per side, odd.
     pub(crate) side: usize,
     /// Pixels to each side of the centre.
     pub(crate) half: usize,
@@ -18,7 +18,8 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// A window of `side` pixels; `causal` leaves only the rows before the centre's and what lies before it in its own.
+    /// A window of `side` pixels; with `causal` only the rows before the central one, and the pixels before the centre
+    /// in its own row, count.
     pub(crate) fn new(side: usize, channels: usize, causal: bool) -> Self {
         let half = side / 2;
         let row = side.div_ceil(LANES) * LANES;
@@ -49,8 +50,8 @@ impl Window {
         self.weights.iter().sum()
     }
 
-    /// Sum over the pixels that count, and channels, of squared differences between a window of the solid and that about
-    /// `place`; some number of at least `bound` once the sum has reached it.
+    /// Sum, over channels and the pixels that count, of squared differences between a window of the solid and that
+    /// about `place`; a number of at least `bound` if the sum reaches it.
     #[inline]
     pub(crate) fn distance(&self, level: &Level, place: usize, window: &[f32], weights: &[f32], bound: f32) -> f32 {
         if self.row == LANES {
@@ -106,4 +107,22 @@ impl Window {
 #[inline]
 fn total(sums: &[f32; LANES]) -> f32 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+}
+
+/// Weighted sum of squared differences; `a` and `b` contain one channel after the other.
+#[inline]
+pub(crate) fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let ((a, _), (b, _), (weights, _)) = (
+        a.as_chunks::<LANES>(),
+        b.as_chunks::<LANES>(),
+        weights.as_chunks::<LANES>(),
+    );
+    for ((a, b), w) in a.iter().zip(b).zip(weights.iter().cycle()) {
+        for lane in 0..LANES {
+            let d = a[lane] - b[lane];
+            sums[lane] += d * d * w[lane];
+        }
+    }
+    sums.iter().sum()
 }

@@ -16,10 +16,12 @@ pub struct FloodFill {
     pub labels: Array3<u32>,
 }
 
-/// Fills the mask (z, y, x) outwards from seed voxels. A heap ordered by distance to the own seed, then by time of insertion, gives the next voxel, so that each seed's cell is its Voronoi cell.
+/// Fills the mask (z, y, x) outwards from seed voxels. A heap ordered by distance to the own seed, then by time of
+/// insertion, gives the next voxel, so that each seed's cell is its Voronoi cell.
 ///
-/// Seeds carry labels from 1; several may share one. Distances are Euclidean, in voxels, and the front advances to all 26 neighbours, so a cell extends around corners of the mask. Seeds outside the mask and
-/// repeated seeds are skipped. Voxels of components without a seed keep the label 0. Cost: N log N.
+/// Seeds carry labels from 1; several may share one. Distances are Euclidean, in voxels, and the front advances to all
+/// 26 neighbours, so a cell extends around corners of the mask. Seeds outside the mask and repeated seeds are skipped.
+/// Voxels of components without a seed keep the label 0. Cost: N log N.
 ///
 /// # References
 ///
@@ -86,7 +88,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(30))]
 
-        /// In a box every voxel belongs to its nearest seed: Voronoi cells. The front may miss the few voxels of a cell that are not connected with it by neighbours.
+        /// In a box every voxel belongs to its nearest seed: Voronoi cells. The front may miss the few voxels of a cell
+        /// that are not connected with it by neighbours.
         #[test]
         fn cells_are_voronoi_cells(seeds in prop::collection::btree_set((0_usize..16, 0_usize..16, 0_usize..16), 1..12)) {
             let seeds: Vec<[usize; 3]> = seeds.into_iter().map(|(z, y, x)| [z, y, x]).collect();

@@ -24,7 +24,8 @@ pub struct Grown {
     pub values: Array4<f32>,
     /// Cell of each voxel, from 1: measured areas first, then random seeds; 0 outside the mask.
     pub labels: Array3<u32>,
-    /// Texel of the exemplar each voxel was copied from, row × width + column; `u32::MAX` for measured voxels and outside.
+    /// Texel of the exemplar each voxel was copied from, row × width + column; `u32::MAX` for measured voxels and
+    /// outside.
     pub sources: Array3<u32>,
     /// Voxels inside the mask.
     pub inside: usize,
@@ -44,14 +45,18 @@ pub struct Grown {
     pub mean_distance: f64,
 }
 
-/// Fills a mask (z, y, x) outwards from measured voxels and random seeds with the texture of an exemplar (row, column, channel).
+/// Fills a mask (z, y, x) outwards from measured voxels and random seeds with the texture of an exemplar (row, column,
+/// channel).
 ///
-/// The window about each voxel lies in a random plane, turned or mirrored at random. The voxel gets the centre of a window of the exemplar whose known voxels are similar: the distance is the sum of
-/// squared differences with normal weights of standard deviation window / 6.4, and one of the windows within the tolerance of the least distance is chosen at random. Measured voxels keep their values exactly. Connected measured
-/// voxels are one seed. Each connected component of the mask (26 neighbours) that has no seed gets one.
+/// The window about each voxel lies in a random plane, turned or mirrored at random. The voxel gets the centre of a
+/// window of the exemplar whose known voxels are similar: the distance is the sum of squared differences with normal
+/// weights of standard deviation window / 6.4, and one of the windows within the tolerance of the least distance is
+/// chosen at random. Measured voxels keep their values exactly. Connected measured voxels are one seed. Each connected
+/// component of the mask (26 neighbours) that has no seed gets one.
 ///
-/// Voxels whose windows do not contain each other are filled at the same time, by a schedule that gives the same solid as filling one by one, with any number of threads. Cost: about 20 µs per voxel and core
-/// for windows of 5 × 5, and 50 ms for the tree of the exemplar's patches.
+/// Voxels whose windows do not contain each other are filled at the same time, by a schedule that gives the same solid
+/// as filling one by one, with any number of threads. Cost: about 20 µs per voxel and core for windows of 5 × 5, and 50
+/// ms for the tree of the exemplar's patches.
 ///
 /// # Errors
 ///

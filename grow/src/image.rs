@@ -13,7 +13,8 @@ use crate::numbers::{MOST, number};
 use crate::options::GrowOptions;
 use crate::planes::image_layout;
 
-/// An image of `height` × `width` pixels grown outwards from a random 3 × 3 piece of the exemplar (row, column, channel) in its centre; windows are neither rotated nor reflected.
+/// An image of `height` × `width` pixels grown outwards from a random 3 × 3 piece of the exemplar (row, column,
+/// channel) in its centre; windows are neither rotated nor reflected.
 ///
 /// # Errors
 ///
@@ -31,7 +32,8 @@ use crate::planes::image_layout;
 /// use stereology_grow::{GrowOptions, grow_picture};
 ///
 /// let stripes = Array3::from_shape_fn((20, 20, 1), |(y, _, _)| (y / 2 % 2) as f32);
-/// let grown = grow_picture(stripes.view(), [30, 40], &GrowOptions::default().with_window(7), &|_| ControlFlow::Continue(()))?;
+/// let options = GrowOptions::default().with_window(7);
+/// let grown = grow_picture(stripes.view(), [30, 40], &options, &|_| ControlFlow::Continue(()))?;
 /// assert!((0..30).all(|y| (1..40).all(|x| grown[[y, x, 0]] == grown[[y, 0, 0]])));
 /// # Ok::<(), stereology_grow::GrowError>(())
 /// ```

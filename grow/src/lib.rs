@@ -1,13 +1,18 @@
-//! Stone grown around measurements: the voxels of a closed mesh are filled outwards from seeds, each with the centre of a window of an exemplar that is similar to what its own window contains so far.
+//! Stone grown around measurements: the voxels of a closed mesh are filled outwards from seeds, each with the centre of
+//! a window of an exemplar that is similar to what its own window contains so far.
 //!
 //! ```text
-//! texel = one at random of those with d ≤ (1 + tolerance) min d,   d = Σ w (voxel − texel)² / Σ w     sums over the known voxels of the window
-//! w: normal weights of standard deviation side / 6.4                                                     (Efros & Leung 1999)
-//! order: the voxels nearest to their own seed first, so that each seed's cell is its Voronoi cell         (Stone et al. 2014, section 4.1.1)
+//! texel = one at random of those with d ≤ (1 + tolerance) min d                   (Efros & Leung 1999)
+//! d = Σ w (voxel − texel)² / Σ w     sums over the known voxels of the window
+//! w: normal weights of standard deviation side / 6.4
+//! order: the voxels nearest to their own seed first, so that each seed's cell is its Voronoi cell
+//!                                                                (Stone et al. 2014, section 4.1.1)
 //! ```
 //!
-//! Windows lie in random planes through the voxel, turned or mirrored at random. Measured voxels keep their values to the bit. Voxels whose windows do not contain each other are filled at the same time, by a schedule
-//! that gives the same solid as filling one by one; a tree of the exemplar's patches replaces the comparison with every window, which is the reference ([`Search::Exact`]).
+//! Windows lie in random planes through the voxel, turned or mirrored at random. Measured voxels keep their values to
+//! the bit. Voxels whose windows do not contain each other are filled at the same time, by a schedule that gives the
+//! same solid as filling one by one; a tree of the exemplar's patches replaces the comparison with every window, which
+//! is the reference ([`Search::Exact`]).
 //!
 //! # Examples
 //!

@@ -6,7 +6,8 @@ use crate::search::Search;
 /// How a solid is grown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrowOptions {
-    /// Side of the window that is compared, pixels: 0 (colours of the exemplar's histogram, without texture), or odd, 3 to 15.
+    /// Side of the window that is compared, pixels: 0 (colours of the exemplar's histogram, without texture), or odd, 3
+    /// to 15.
     pub window: usize,
     /// Random seeds in addition to the measurements.
     pub seeds: usize,

@@ -12,8 +12,10 @@ use crate::search::Search;
 const LEAF: usize = 32;
 /// A window's rows are padded to a multiple of so many samples.
 const LANES: usize = 4;
-/// Standard deviations from the mean of a node within which a sample has no distance to it. With 0, nodes with different windows are skipped and rare patterns of the exemplar die out (soapstone of docs/grow.md, 20³
-/// voxels: standard deviation .82 of the exemplar's, with the exact search .92); with .5 it is .91, at the same squared difference.
+/// Standard deviations from the mean of a node within which a sample has no distance to it. With 0, nodes with
+/// different windows are skipped and rare patterns of the exemplar die out (soapstone of docs/grow.md, 20³ voxels:
+/// standard deviation .82 of the exemplar's, with the exact search .92); with .5 it is .91, at the same squared
+/// difference.
 const NODE_SPREAD: f32 = 0.5;
 
 /// A known sample of a window.
@@ -30,7 +32,8 @@ pub(crate) struct Known {
 /// A window found: its distance and its central texel, row × width + column.
 pub(crate) type Match = (f32, u32);
 
-/// All whole windows of an exemplar, split recursively in two along the direction of their largest variance. The windows of a leaf are compared one by one, row by row, the row of largest weight first, until their distance is too
+/// All whole windows of an exemplar, split recursively in two along the direction of their largest variance. The
+/// windows of a leaf are compared one by one, row by row, the row of largest weight first, until their distance is too
 /// large.
 #[derive(Debug)]
 pub(crate) struct PatchTree<'a> {
@@ -55,7 +58,8 @@ enum Node {
 }
 
 impl<'a> PatchTree<'a> {
-    /// The tree of the windows of side 2 `reach` + 1, which must fit into the exemplar. Cost: N log N times the samples of a window; 50 ms for 256² texels and 5 × 5.
+    /// The tree of the windows of side 2 `reach` + 1, which must fit into the exemplar. Cost: N log N times the samples
+    /// of a window; 50 ms for 256² texels and 5 × 5.
     pub(crate) fn new(exemplar: ArrayView3<'a, f32>, reach: usize) -> Self {
         let (height, width, channels) = exemplar.dim();
         let side = 2 * reach + 1;
@@ -160,8 +164,9 @@ impl<'a> PatchTree<'a> {
         node
     }
 
-    /// Writes to `found` the windows whose distance to the known samples is at most `1 + tolerance` times the least, sorted by texel, and returns the least distance. The windows about the texels `more` are
-    /// compared too; `salt` chooses among nodes at equal distance.
+    /// Writes to `found` the windows whose distance to the known samples is at most `1 + tolerance` times the least,
+    /// sorted by texel, and returns the least distance. The windows about the texels `more` are compared too; `salt`
+    /// chooses among nodes at equal distance.
     pub(crate) fn similar(
         &self,
         known: &[Known],
@@ -182,7 +187,8 @@ impl<'a> PatchTree<'a> {
                 let mut open = BinaryHeap::new();
                 let mut next = Some(0);
                 for _ in 0..leaves.max(1) {
-                    // From the nearest open node down to a leaf, always to the nearer child; the other child stays open.
+                    // From the nearest open node down to a leaf, always to the nearer child; the other child stays
+                    // open.
                     let Some(mut node) = next.take().or_else(|| open.pop().map(|open: Open| open.node)) else {
                         break;
                     };
@@ -239,7 +245,8 @@ impl<'a> PatchTree<'a> {
         sums.iter().sum()
     }
 
-    /// Distance of the whole window about a texel; if it is larger than `most`, some number between `most` and the distance.
+    /// Distance of the whole window about a texel; if it is larger than `most`, some number between `most` and the
+    /// distance.
     fn distance(&self, sought: &Sought, texel: u32, most: f32) -> f32 {
         let (_, width, channels) = self.exemplar.dim();
         let first = self.first(texel);
@@ -348,7 +355,8 @@ fn principal(windows: &[f32], mean: &[f32]) -> Vec<f32> {
 #[derive(Clone, Copy, Debug)]
 struct Open {
     distance: f32,
-    /// Random, so that each of several equally near nodes can come first: common patterns of the exemplar must not hide rare ones.
+    /// Random, so that each of several equally near nodes can come first: common patterns of the exemplar must not hide
+    /// rare ones.
     tie: u32,
     node: u32,
 }

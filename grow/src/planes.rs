@@ -12,7 +12,8 @@ pub enum Planes {
     Oblique,
 }
 
-/// The position of each pixel of a window, as a step (z, y, x) from the voxel; `None` for the centre and for pixels whose nearest voxel belongs to another pixel.
+/// The position of each pixel of a window, as a step (z, y, x) from the voxel; `None` for the centre and for pixels
+/// whose nearest voxel belongs to another pixel.
 pub(crate) type Layout = Vec<Option<[isize; 3]>>;
 
 /// Layouts by plane, then by the eight rotations and reflections of the window (the first is the identity).
@@ -85,7 +86,8 @@ mod tests {
     use super::{Planes, layouts};
     use std::collections::BTreeSet;
 
-    /// A window in a plane of the axes has all its pixels, and its eight rotations and reflections are the same set of voxels.
+    /// A window in a plane of the axes has all its pixels, and its eight rotations and reflections are the same set of
+    /// voxels.
     #[test]
     fn turns_permute_one_set() {
         let all = layouts(Planes::Oblique, 2);

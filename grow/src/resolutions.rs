@@ -20,7 +20,8 @@ pub struct LevelOptions {
     pub window: usize,
     /// How similar neighbourhoods are searched for.
     pub search: Search,
-    /// One of the neighbourhoods whose distance is at most 1 + this number times the least distance is chosen at random.
+    /// One of the neighbourhoods whose distance is at most 1 + this number times the least distance is chosen at
+    /// random.
     pub tolerance: f32,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -59,8 +60,9 @@ impl LevelOptions {
     }
 }
 
-/// An image of `height` × `width` pixels that repeats without a seam, made row by row at each of several resolutions. Every pixel is chosen by the half window above and to the left, which is always known, and by the
-/// 3 × 3 pixels about its position one level coarser.
+/// An image of `height` × `width` pixels that repeats without a seam, made row by row at each of several resolutions.
+/// Every pixel is chosen by the half window above and to the left, which is always known, and by the 3 × 3 pixels about
+/// its position one level coarser.
 ///
 /// # Errors
 ///
@@ -100,7 +102,8 @@ pub fn synthesize_by_levels(
         return Err(GrowError::TooLarge);
     }
     let (rows, columns, _) = exemplar.dim();
-    // One level coarser a pixel stands for two along each axis. More than one window must fit, so that there is a choice.
+    // One level coarser a pixel stands for two along each axis. More than one window must fit, so that there is a
+    // choice.
     let most = (1..)
         .take_while(|level| rows.min(columns) >> (level - 1) > options.window)
         .last()

@@ -1,4 +1,5 @@
-//! The schedule of filling: rounds of voxels whose windows do not contain each other, so that they can be filled at the same time.
+//! The schedule of filling: rounds of voxels whose windows do not contain each other, so that they can be filled at the
+//! same time.
 
 use ndarray::Array3;
 use rand::{RngExt, SeedableRng};
@@ -17,7 +18,8 @@ pub(crate) struct Draw {
     pub(crate) choice: f32,
 }
 
-/// Voxels by round. A voxel's window contains only voxels of earlier rounds, and voxels later in the order, which do not count; so filling round by round gives the same solid as filling one by one.
+/// Voxels by round. A voxel's window contains only voxels of earlier rounds, and voxels later in the order, which do
+/// not count; so filling round by round gives the same solid as filling one by one.
 #[derive(Debug)]
 pub(crate) struct Schedule {
     /// Place of each voxel in the order of filling; `u32::MAX` outside.

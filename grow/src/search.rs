@@ -5,7 +5,8 @@
 pub enum Search {
     /// Every window of the exemplar is compared; this is the reference.
     Exact,
-    /// Best-first search in a tree of patches with leaves of up to 32 windows, and the windows that continue those from which the known neighbours were copied.
+    /// Best-first search in a tree of patches with leaves of up to 32 windows, and the windows that continue those from
+    /// which the known neighbours were copied.
     Tree {
         /// Leaves visited.
         leaves: usize,

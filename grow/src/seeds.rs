@@ -17,7 +17,8 @@ pub(crate) struct Seeds {
 }
 
 impl Seeds {
-    /// The measured voxels, sorted by position: connected ones (26 neighbours) share a cell, numbered in the order of their first voxel.
+    /// The measured voxels, sorted by position: connected ones (26 neighbours) share a cell, numbered in the order of
+    /// their first voxel.
     pub(crate) fn measured(size: (usize, usize, usize), measured: &[[usize; 3]]) -> Self {
         if measured.is_empty() {
             return Self::default();
@@ -97,7 +98,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// The same seeds, in the same order, as filling again for every part without a seed; and one fill with them reaches every voxel.
+        /// The same seeds, in the same order, as filling again for every part without a seed; and one fill with them
+        /// reaches every voxel.
         #[test]
         fn components_are_seeded_as_by_repeated_fills(
             bits in prop::collection::vec(prop::bool::weighted(0.15), 9 * 10 * 11),
@@ -123,7 +125,8 @@ mod tests {
         assert_eq!((cells, seeds.cells), (vec![1, 1, 2], 2));
     }
 
-    /// Thousands of separate parts are seeded and filled by one pass each; filling again for every part would visit 8,000 times as many voxels.
+    /// Thousands of separate parts are seeded and filled by one pass each; filling again for every part would visit
+    /// 8,000 times as many voxels.
     #[test]
     fn thousands_of_components() {
         let mask = Array3::from_shape_fn((80, 80, 80), |(z, y, x)| [z, y, x].iter().all(|i| i % 4 < 3));

@@ -19,8 +19,9 @@ pub struct Voxels {
 }
 
 impl Voxels {
-    /// The mesh with `resolution` voxels along the longest side of its box; the shorter sides get the smallest number of whole voxels that covers them, centred. Exact for every centre; points on the surface are
-    /// outside. Cost: about a microsecond per voxel of the box and core.
+    /// The mesh with `resolution` voxels along the longest side of its box; the shorter sides get the smallest number
+    /// of whole voxels that covers them, centred. Exact for every centre; points on the surface are outside. Cost:
+    /// about a microsecond per voxel of the box and core.
     ///
     /// # Errors
     ///
@@ -91,7 +92,8 @@ impl Voxels {
         Some([index(place.z, nz)?, index(place.y, ny)?, index(place.x, nx)?])
     }
 
-    /// The voxel inside whose centre is nearest to a point, and that distance in voxels, among those within `reach` voxels; the first of equally near ones.
+    /// The voxel inside whose centre is nearest to a point, and that distance in voxels, among those within `reach`
+    /// voxels; the first of equally near ones.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,

@@ -7,13 +7,15 @@ use ndarray::ArrayView2;
 pub struct Copying {
     /// Fraction of the texels that are used at all.
     pub coverage: f64,
-    /// Exponential of the entropy of their use, over their number n: 1 if all are used equally often, 1/n if only one is used.
+    /// Exponential of the entropy of their use, over their number n: 1 if all are used equally often, 1/n if only one
+    /// is used.
     pub perplexity: f64,
     /// Longest run of pixels along a row or a column that is an exact copy of the exemplar, pixels.
     pub longest_copy: usize,
 }
 
-/// Coverage and copying of images, given the source of each pixel: row × `width` + column in an exemplar of `height` × `width` texels. Larger numbers do not count.
+/// Coverage and copying of images, given the source of each pixel: row × `width` + column in an exemplar of `height` ×
+/// `width` texels. Larger numbers do not count.
 ///
 /// # Examples
 ///
@@ -81,7 +83,8 @@ mod tests {
     use super::copying;
     use ndarray::Array2;
 
-    /// A copy ends at the exemplar's right border, although the next number follows there; a single texel has perplexity 1/n.
+    /// A copy ends at the exemplar's right border, although the next number follows there; a single texel has
+    /// perplexity 1/n.
     #[test]
     fn rows_end_at_the_border() {
         let over = Array2::from_shape_fn((1, 6), |(_, x)| [0, 1, 2, 3, 4, 5][x]);

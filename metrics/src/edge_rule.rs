@@ -1,7 +1,8 @@
 //! Which profiles count at the edges of a sampling window, and how much.
 //!
-//! Large profiles are cut by the edge of a window more often than small ones. Counting all of them, clipped, overestimates the number per area (by 38 % in a window
-//! three times as wide as the largest particle; N_V by 102 %); leaving out those that touch the edge underestimates it (N_V by 20 %). The other rules are unbiased.
+//! Large profiles are cut by the edge of a window more often than small ones. Counting all of them, clipped,
+//! overestimates the number per area (by 38 % in a window three times as wide as the largest particle; N_V by 102 %);
+//! leaving out those that touch the edge underestimates it (N_V by 20 %). The other rules are unbiased.
 
 /// Smallest box around a profile, with sides parallel to those of the window; lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,16 +21,19 @@ pub struct BoundingBox {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EdgeRule {
-    /// A profile wholly inside counts W H / ((W − w)(H − h)), where w and h are the sides of its box: the inverse of its chance to lie wholly inside
-    /// (Miles 1974, Lantuéjoul 1980). The area is that of the window.
+    /// A profile wholly inside counts W H / ((W − w)(H − h)), where w and h are the sides of its box: the inverse of
+    /// its chance to lie wholly inside (Miles 1974, Lantuéjoul 1980). The area is that of the window.
     MilesLantuejoul,
-    /// Counting frame with forbidden lines (Gundersen 1977): a profile that touches the left or upper edge does not count, all others do, whole or clipped.
-    /// Unbiased in number, but the sizes of clipped profiles must be those of the whole profile. The area is that of the window.
+    /// Counting frame with forbidden lines (Gundersen 1977): a profile that touches the left or upper edge does not
+    /// count, all others do, whole or clipped. Unbiased in number, but the sizes of clipped profiles must be those of
+    /// the whole profile. The area is that of the window.
     CountingFrame,
-    /// Associated point rule (Miles 1978): a profile counts if the upper left corner of its box lies in a frame inside the window, whose distance from the right and lower edges is
-    /// the largest extent of a profile, so that every profile that counts is seen whole. The area is that of the frame.
+    /// Associated point rule (Miles 1978): a profile counts if the upper left corner of its box lies in a frame inside
+    /// the window, whose distance from the right and lower edges is the largest extent of a profile, so that every
+    /// profile that counts is seen whole. The area is that of the frame.
     AssociatedPoint,
-    /// Plus-sampling: a profile counts if the centre of its box lies inside; profiles must be known beyond the window. The area is that of the window.
+    /// Plus-sampling: a profile counts if the centre of its box lies inside; profiles must be known beyond the window.
+    /// The area is that of the window.
     PlusSampling,
     /// Everything counts, clipped or not: biased, for comparison and for windows that cut no profile.
     All,
@@ -63,8 +67,8 @@ pub struct EdgeWeights {
     pub weights: Vec<f64>,
     /// Area to which the weights belong: their sum over it is the number per area.
     pub area: f64,
-    /// Whether the frame of [`EdgeRule::AssociatedPoint`] was limited to half of the window's width or height because a profile extends over more than that. Profiles this large may be
-    /// undercounted.
+    /// Whether the frame of [`EdgeRule::AssociatedPoint`] was limited to half of the window's width or height because a
+    /// profile extends over more than that. Profiles this large may be undercounted.
     pub frame_limited: bool,
 }
 
@@ -100,7 +104,8 @@ impl SamplingWindow {
         }
     }
 
-    /// A window of whole pixels whose boxes end at the sides of pixels: one that lies wholly inside leaves a pixel free along every edge, and has W − 1 − w positions.
+    /// A window of whole pixels whose boxes end at the sides of pixels: one that lies wholly inside leaves a pixel free
+    /// along every edge, and has W − 1 − w positions.
     #[must_use]
     pub fn pixels(width: usize, height: usize) -> Self {
         Self {
@@ -112,7 +117,8 @@ impl SamplingWindow {
 
     /// What each profile counts, and over which area.
     ///
-    /// A profile as wide as the window or wider never lies wholly inside and never counts under [`EdgeRule::MilesLantuejoul`].
+    /// A profile as wide as the window or wider never lies wholly inside and never counts under
+    /// [`EdgeRule::MilesLantuejoul`].
     #[must_use]
     pub fn weigh(&self, profiles: &[BoundingBox], rule: EdgeRule) -> EdgeWeights {
         let Self { width, height, step } = *self;
@@ -126,8 +132,8 @@ impl SamplingWindow {
                     return width * height / positions;
                 }
                 EdgeRule::MilesLantuejoul => false,
-                // The forbidden lines are the left edge prolonged downwards and the upper edge prolonged to the right: what a box that meets the window can touch
-                // of them lies left of the window or above it.
+                // The forbidden lines are the left edge prolonged downwards and the upper edge prolonged to the right:
+                // what a box that meets the window can touch of them lies left of the window or above it.
                 EdgeRule::CountingFrame => meets(of) && of.left > 0.0 && of.top > 0.0,
                 EdgeRule::AssociatedPoint => is_inside(of) && of.left < right.end && of.top < lower.end,
                 EdgeRule::PlusSampling => {
@@ -151,7 +157,8 @@ impl SamplingWindow {
         }
     }
 
-    /// Where the frame of the associated point rule ends along x and y: whatever starts before must end inside the window.
+    /// Where the frame of the associated point rule ends along x and y: whatever starts before must end inside the
+    /// window.
     fn frame(&self, profiles: &[BoundingBox]) -> [FrameEnd; 2] {
         let end = |side: f64, extent: &dyn Fn(&BoundingBox) -> f64| {
             let largest = profiles.iter().map(|of| extent(of) + self.step).fold(0.0, f64::max);
@@ -188,7 +195,8 @@ mod tests {
         EdgeRule::CountingFrame,
     ];
 
-    /// A box of each size at every place where it meets a window of pixels counts as if one lay at every pixel: the sum of the weights over the area is 1.
+    /// A box of each size at every place where it meets a window of pixels counts as if one lay at every pixel: the sum
+    /// of the weights over the area is 1.
     #[test]
     fn each_size_is_counted_as_often_as_it_occurs() {
         let (width, height) = (23_usize, 17_usize);

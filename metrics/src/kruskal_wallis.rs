@@ -18,16 +18,18 @@ pub struct KruskalWallis {
 
 /// Tests whether `groups` of values have the same distribution, by their ranks.
 ///
-/// Groups of fewer than five values are left out, since the p-value is that of the limit of large groups. `None` if fewer than two groups remain or all values are equal.
-/// Cost: that of sorting.
+/// Groups of fewer than five values are left out, since the p-value is that of the limit of large groups. `None` if
+/// fewer than two groups remain or all values are equal. Cost: that of sorting.
 ///
 /// # Formula
 ///
 /// ```text
-/// H = (12 / (N (N + 1)) Σ R_g² / n_g − 3 (N + 1)) / (1 − Σ (t³ − t) / (N³ − N)),   H ~ χ² with groups − 1 degrees of freedom
+/// H = (12 / (N (N + 1)) Σ R_g² / n_g − 3 (N + 1)) / (1 − Σ (t³ − t) / (N³ − N))
+/// H ~ χ² with groups − 1 degrees of freedom
 /// ```
 ///
-/// R_g is the sum of the ranks of group g among all N values (tied values have their mean rank), and t are the numbers of tied values.
+/// R_g is the sum of the ranks of group g among all N values (tied values have their mean rank), and t are the numbers
+/// of tied values.
 ///
 /// # References
 ///
@@ -115,7 +117,8 @@ mod tests {
         }
     }
 
-    /// The p-value is that of random exchanges of the values between groups, which is exact, up to the approximation for groups of 8 to 20 values with ties.
+    /// The p-value is that of random exchanges of the values between groups, which is exact, up to the approximation
+    /// for groups of 8 to 20 values with ties.
     #[test]
     fn p_values_are_those_of_random_exchanges() {
         const EXCHANGES: usize = 4000;

@@ -34,7 +34,8 @@ pub struct LabelMapsDiffer {
 
 /// Compares two label maps in which 0 is the binder; profiles of fewer than 20 pixels are left out of both.
 ///
-/// Pairs of a true and a found profile are matched in the order of their intersection over union, the largest first. Cost: linear in the pixels.
+/// Pairs of a true and a found profile are matched in the order of their intersection over union, the largest first.
+/// Cost: linear in the pixels.
 ///
 /// # Errors
 ///
@@ -145,7 +146,8 @@ mod tests {
         }
     }
 
-    /// A profile found three fifths as large has an intersection over union of .6: right at one half, wrong at three quarters.
+    /// A profile found three fifths as large has an intersection over union of .6: right at one half, wrong at three
+    /// quarters.
     #[test]
     fn precision_depends_on_the_overlap_demanded() {
         let truth = Array2::from_shape_fn((10, 20), |(_, x)| u32::from(x < 10));

@@ -13,10 +13,12 @@
 //! | How similar are the slices of a solid to an exemplar? | [`compare`] | `images` |
 //! | Where does a synthesised solid come from? | [`copying`], [`seams`] | `images` |
 //!
-//! Every crate of the project describes remarks on its result as [`Finding`]s, accepts a [`Progress`] callback for long work, and checks the edges of size bins with
-//! [`check_edges`], so that a program that combines several crates handles one type of each. Both features are on by default; without them the crate needs `thiserror` alone.
+//! Every crate of the project describes remarks on its result as [`Finding`]s, accepts a [`Progress`] callback for long
+//! work, and checks the edges of size bins with [`check_edges`], so that a program that combines several crates handles
+//! one type of each. Both features are on by default; without them the crate needs `thiserror` alone.
 //!
-//! The measures do not depend on how a solid was made. Images are `ndarray` arrays (row, column, channel) with values from 0 to 1, volumes (z, y, x, channel).
+//! The measures do not depend on how a solid was made. Images are `ndarray` arrays (row, column, channel) with values
+//! from 0 to 1, volumes (z, y, x, channel).
 //!
 //! # Examples
 //!

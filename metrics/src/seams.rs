@@ -14,14 +14,16 @@ pub struct Seams {
 }
 
 impl Seams {
-    /// Steps across borders over steps inside: 1 if the borders show no seam. `None` without borders or without texture.
+    /// Steps across borders over steps inside: 1 if the borders show no seam. `None` without borders or without
+    /// texture.
     #[must_use]
     pub fn visibility(&self) -> Option<f64> {
         (self.pairs > 0 && self.inside > 0.0).then(|| self.across / self.inside)
     }
 }
 
-/// Mean steps of a volume (z, y, x, channel) between neighbours along the axes, within cells and across their borders; label 0 is outside and does not count.
+/// Mean steps of a volume (z, y, x, channel) between neighbours along the axes, within cells and across their borders;
+/// label 0 is outside and does not count.
 ///
 /// # Examples
 ///
@@ -30,7 +32,7 @@ impl Seams {
 /// use stereology_metrics::seams;
 ///
 /// let labels = Array3::from_shape_fn((4, 4, 8), |(_, _, x)| 1 + u32::from(x >= 4));
-/// let volume = Array4::from_shape_fn((4, 4, 8, 1), |(z, _, x, _)| 0.1 * (z % 2) as f32 + if x < 4 { 0.0 } else { 0.5 });
+/// let volume = Array4::from_shape_fn((4, 4, 8, 1), |(z, _, x, _)| 0.1 * (z % 2) as f32 + 0.5 * (x / 4) as f32);
 /// let found = seams(volume.view(), labels.view());
 /// assert!((found.across - 0.5).abs() < 1e-6 && found.pairs == 16);
 /// ```

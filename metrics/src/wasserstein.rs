@@ -2,7 +2,8 @@
 
 use std::iter;
 
-/// Wasserstein-1 distance of two samples of (value, weight): the mean distance by which the weight of one must be moved to become the other.
+/// Wasserstein-1 distance of two samples of (value, weight): the mean distance by which the weight of one must be moved
+/// to become the other.
 ///
 /// In the unit of the values; infinite if a sample has no weight. Cost: that of sorting.
 ///
@@ -34,7 +35,8 @@ pub fn wasserstein(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
     area_between(steps)
 }
 
-/// Wasserstein-1 distance of two samples of equal weights, each sorted, of any numbers of values. Zero if one is empty. Cost: linear.
+/// Wasserstein-1 distance of two samples of equal weights, each sorted, of any numbers of values. Zero if one is empty.
+/// Cost: linear.
 ///
 /// ```
 /// use stereology_metrics::wasserstein_sorted;
@@ -47,7 +49,8 @@ pub fn wasserstein_sorted(a: &[f32], b: &[f32]) -> f64 {
     if a.is_empty() || b.is_empty() {
         return 0.0;
     }
-    // Each distribution function times the product of both numbers of values: whole numbers, which add without rounding.
+    // Each distribution function times the product of both numbers of values: whole numbers, which add without
+    // rounding.
     let (step_a, step_b) = (b.len() as f64, -(a.len() as f64));
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     let steps = iter::from_fn(|| {
@@ -65,7 +68,8 @@ pub fn wasserstein_sorted(a: &[f32], b: &[f32]) -> f64 {
     area_between(steps) / (step_a * -step_b)
 }
 
-/// Wasserstein-1 distance, in bins, of two histograms over the same bins, each with the sum 1; the shorter one is continued with zeros.
+/// Wasserstein-1 distance, in bins, of two histograms over the same bins, each with the sum 1; the shorter one is
+/// continued with zeros.
 ///
 /// ```
 /// use stereology_metrics::wasserstein_of_bins;

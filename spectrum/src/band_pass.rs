@@ -24,7 +24,8 @@ pub struct BandPass {
     pub period: f64,
     /// Standard deviation of the radial gain, in natural logarithms of frequency.
     pub width: f64,
-    /// Direction along the fringes (0 to π from the columns' axis) and the standard deviation about it, radians; `None` for all directions.
+    /// Direction along the fringes (0 to π from the columns' axis) and the standard deviation about it, radians; `None`
+    /// for all directions.
     pub direction: Option<(f64, f64)>,
 }
 
@@ -48,7 +49,8 @@ impl BandPass {
         }
     }
 
-    /// The band in which an image has most power per octave, from 3 pixels to a sixth of its side; with a direction (standard deviation 20 degrees) if most of that power lies about one direction.
+    /// The band in which an image has most power per octave, from 3 pixels to a sixth of its side; with a direction
+    /// (standard deviation 20 degrees) if most of that power lies about one direction.
     ///
     /// # Errors
     ///
@@ -109,7 +111,8 @@ impl BandPass {
         }
         let band = Self::new((-around(best, 1) / power).exp());
         let (c, s) = (around(best, 2) / power, around(best, 3) / power);
-        // The length of the mean vector of doubled directions: 1 for one direction, 0 if all directions are equally strong.
+        // The length of the mean vector of doubled directions: 1 for one direction, 0 if all directions are equally
+        // strong.
         Ok(if c.hypot(s) > 0.5 {
             let normal = 0.5 * s.atan2(c);
             band.with_direction((normal + PI / 2.0).rem_euclid(PI), 20_f64.to_radians())
@@ -143,7 +146,8 @@ impl BandPass {
         })
     }
 
-    /// The image reduced to the band, with values about zero. The image's periodic component is filtered, so that jumps between opposite borders leave no trace.
+    /// The image reduced to the band, with values about zero. The image's periodic component is filtered, so that jumps
+    /// between opposite borders leave no trace.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Solids from exemplars: laws that hold whatever the picture.
+//! Laws of solids from exemplars that hold for any image.
 
 use ndarray::{Array2, Array3, Array4};
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ fn discs(side: usize, seed: u64) -> Array2<u32> {
     })
 }
 
-/// Not its own mirror image in any axis, of period 8: slow rise, fast fall along rows and columns.
+/// A field of period 8 without mirror symmetry: slow increase and fast decrease along rows and columns.
 fn chiral(z: usize, x: usize) -> f32 {
     let saw = |i: usize| (i % 8) as f32 / 8.0;
     0.6 * saw(z) + 0.3 * saw(x + z / 2) + 0.1 * saw(2 * z + 5 * x)
@@ -54,7 +54,7 @@ fn small() -> SolidOptions {
     SolidOptions::default().with_levels(1).with_iterations(3)
 }
 
-/// v(z, y, x) = f(z, x + y) shows f on its slices of constant y and of constant x.
+/// The solid v(z, y, x) = f(z, x + y), whose slices of constant y and of constant x equal f.
 fn woven(side: usize) -> Array3<f32> {
     Array3::from_shape_fn((side, side, side), |(z, y, x)| chiral(z, (x + y) % side))
 }
@@ -66,7 +66,7 @@ fn all_given(volume: &Array3<f32>) -> Vec<FixedVoxel> {
         .collect()
 }
 
-/// A solid whose slices are the exemplar's has no energy; its mirror image has.
+/// A solid whose slices equal the exemplar has energy 0; its mirror image has not.
 #[test]
 fn slices_of_the_exemplar_cost_nothing() {
     let exemplar = Exemplar::grey(Array2::from_shape_fn((40, 40), |(z, x)| chiral(z, x)).view()).unwrap();
@@ -85,12 +85,12 @@ fn slices_of_the_exemplar_cost_nothing() {
         let mut mirrored = volume.clone();
         mirrored.invert_axis(ndarray::Axis(axis));
         let cost = energy(&mirrored.as_standard_layout().into_owned());
-        // Mirrored in x or y alone, one family of slices is f of x - y: its rows run backwards.
+        // Reflected in x or y alone, one family of slices is f of x - y, with reversed rows.
         assert!(cost > 0.1, "{axis}: {cost}");
     }
 }
 
-/// What is missing of such a solid is put back exactly, by either solver: votes come from the right places.
+/// Either solver restores missing parts of such a solid exactly, so votes come from the right places.
 #[test]
 fn holes_close_exactly() {
     let exemplar = Exemplar::grey(Array2::from_shape_fn((40, 40), |(z, x)| chiral(z, x)).view()).unwrap();
@@ -116,7 +116,7 @@ fn holes_close_exactly() {
     }
 }
 
-/// Mean cube of steps along an axis: negative where values rise slowly and fall fast.
+/// Mean cube of steps along an axis: negative if values increase slowly and decrease fast.
 fn lean(volume: &Array4<f32>, axis: usize) -> f32 {
     let (nz, ny, nx, _) = volume.dim();
     let n = [nz, ny, nx];
@@ -128,7 +128,8 @@ fn lean(volume: &Array4<f32>, axis: usize) -> f32 {
     steps.sum::<f32>() / volume.len() as f32
 }
 
-/// Rows of an exemplar run along z; columns of the first along x, of the second along y; rows of the third along y and its columns along x.
+/// Rows of an exemplar run along z; columns of the first along x, of the second along y; rows of the third along y and
+/// its columns along x.
 #[test]
 fn exemplars_lie_as_documented() {
     let saw = |i: usize, turned: bool| {
@@ -140,7 +141,7 @@ fn exemplars_lie_as_documented() {
         Exemplar::grey(values.view()).unwrap()
     };
     let domain = Domain::new([16; 3]).unwrap();
-    // Along z rising, along x rising, along y falling.
+    // Increasing along z and x, decreasing along y.
     let options = SolidOptions::default().with_levels(2).with_views(Views::Two);
     let solid = made(&[picture(false, false), picture(false, true)], &domain, &options);
     let [z, y, x] = [0, 1, 2].map(|axis| lean(&solid.values, axis));
@@ -155,7 +156,7 @@ fn exemplars_lie_as_documented() {
     assert!(z < 0.0 && x < 0.0 && y > 0.0, "{z} {y} {x}");
 }
 
-/// The same bits at any number of threads, for both solvers.
+/// Both solvers give the same bits with any number of threads.
 #[test]
 fn threads_do_not_matter() {
     let exemplar = [Exemplar::grey(layers(48).view()).unwrap()];
@@ -175,7 +176,7 @@ fn threads_do_not_matter() {
     }
 }
 
-/// A pixel of the exemplar in every voxel, all of it used, contrast and grey levels kept; means lose contrast.
+/// Every voxel is a pixel of the exemplar, all pixels are used, contrast and grey levels are kept; means lose contrast.
 #[test]
 fn best_keeps_the_histogram_and_averaging_does_not() {
     let picture = layers(64);
@@ -203,7 +204,7 @@ fn best_keeps_the_histogram_and_averaging_does_not() {
     assert!(averaged < 0.8, "{averaged}");
 }
 
-/// Matches found by coherence are nearly as good as those found by looking at all.
+/// Matches found by coherence are nearly as good as those of the exact search.
 #[test]
 fn coherence_comes_near_exact_search() {
     let exemplar = [Exemplar::grey(layers(40).view()).unwrap()];
@@ -226,7 +227,7 @@ fn coherence_comes_near_exact_search() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
-    /// The solid has the phases' fractions to the voxel: V_V = A_A, also of a section of overlapping spheres.
+    /// The solid has the phases' fractions to the voxel, V_V = A_A, also for a section of overlapping spheres.
     #[test]
     fn fractions_are_exact(seed in 0_u64..1000, nz in 10_usize..20) {
         let map = discs(40, seed);
@@ -239,7 +240,7 @@ proptest! {
         prop_assert!(solid.values.iter().all(|v| *v == 0.0 || *v == 1.0));
     }
 
-    /// Given voxels are kept, nothing is written outside the mask, whatever the method.
+    /// Every method keeps fixed voxels and writes nothing outside the mask.
     #[test]
     fn constraints_hold(seed in 0_u64..1000, which in 0_usize..4) {
         let method = [Method::Best, Method::WeiLevoy, Method::Kopf, Method::ChenWang][which];
@@ -265,7 +266,7 @@ proptest! {
     }
 }
 
-/// Every scan, search and solver makes a solid of colours, bounded or not, with features beside.
+/// Every scan, search and solver makes a solid of colours with features, bounded or not.
 #[test]
 fn all_ways_lead_to_a_solid() {
     let picture = Array3::from_shape_fn((32, 32, 3), |(y, x, c)| ((y * (c + 1) + x * x) % 13) as f32 / 13.0);
@@ -294,9 +295,9 @@ fn all_ways_lead_to_a_solid() {
     }
 }
 
-/// Every mistake has its own answer.
+/// Every invalid input has its own error.
 #[test]
-fn mistakes_are_told() {
+fn invalid_inputs_are_refused() {
     let exemplar = Exemplar::grey(layers(32).view()).unwrap();
     let domain = Domain::new([16; 3]).unwrap();
     let fails = |exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions| {

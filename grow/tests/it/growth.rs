@@ -1,4 +1,5 @@
-//! Solids grown around measurements: measurements are kept, grown voxels are texels of the exemplar, and the result does not depend on the number of threads.
+//! Solids grown around measurements: measurements are kept, grown voxels are texels of the exemplar, and the result
+//! does not depend on the number of threads.
 
 use ndarray::{Array3, Array4};
 use proptest::prelude::*;
@@ -66,7 +67,8 @@ fn voxels_are_the_centres_inside() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Measured values are kept to the bit at any place; every other voxel inside is a texel of the exemplar, and voxels outside stay 0.
+    /// Measured values are kept to the bit at any place; every other voxel inside is a texel of the exemplar, and
+    /// voxels outside stay 0.
     #[test]
     fn measurements_stay_and_the_mask_is_filled(
         places in prop::collection::btree_map((0_usize..12, 0_usize..12, 0_usize..12), 0_u8..255, 0..20),
@@ -146,7 +148,8 @@ fn the_tree_is_nearly_exact() {
     );
 }
 
-/// Windows make neighbouring voxels similar, and cells show seams; with the histogram alone there is no texture, so there are no seams.
+/// Windows make neighbouring voxels similar, and cells show seams; with the histogram alone there is no texture, so
+/// there are no seams.
 #[test]
 fn windows_make_texture() {
     let mask = Array3::from_elem((24, 24, 24), true);

@@ -16,10 +16,12 @@ use crate::wasserstein::wasserstein_sorted;
 /// Pixels that an exemplar needs along each axis so that its halves can be measured; half as many suffice for slices.
 const LEAST: usize = 16;
 
-/// Compares the slices of a solid with an exemplar, values 0 to 1, axes (row, column, channel). The exemplar may be several images, such as the slices of a real volume.
+/// Compares the slices of a solid with an exemplar, values 0 to 1, axes (row, column, channel). The exemplar may be
+/// several images, such as the slices of a real volume.
 ///
-/// Patches are compared in colour if both sides have as many channels, else in grey; all other figures are of grey levels. Without a band the figures of fringes are `None`.
-/// Cost: about .3 s per million pixels and core, and 3 s for the patches.
+/// Patches are compared in colour if both sides have as many channels, else in grey; all other figures are of grey
+/// levels. Without a band the figures of fringes are `None`. Cost: about .3 s per million pixels and core, and 3 s for
+/// the patches.
 ///
 /// # Errors
 ///
@@ -32,7 +34,8 @@ const LEAST: usize = 16;
 /// use std::ops::ControlFlow;
 /// use stereology_metrics::{MeasureOptions, compare};
 ///
-/// let waves = |shift: usize| Array3::from_shape_fn((64, 64, 1), move |(y, x, _)| 0.5 + 0.5 * (((x + shift) * (y + 7)) as f32 * 0.003).sin());
+/// let wave = |v: usize| 0.5 + 0.5 * (v as f32 * 0.003).sin();
+/// let waves = |shift: usize| Array3::from_shape_fn((64, 64, 1), move |(y, x, _)| wave((x + shift) * (y + 7)));
 /// let exemplar = waves(0);
 /// let blurred = waves(3).mapv(|v| 0.5 + 0.7 * (v - 0.5));
 /// let options = MeasureOptions::new(0.5).with_patches(500);
@@ -81,7 +84,8 @@ pub fn compare(
     Ok(found)
 }
 
-/// Checks that an exemplar and slices can be compared: images of enough pixels (16 along each axis of an exemplar, 8 of a slice) with finite samples.
+/// Checks that an exemplar and slices can be compared: images of enough pixels (16 along each axis of an exemplar, 8 of
+/// a slice) with finite samples.
 ///
 /// # Errors
 ///
@@ -154,7 +158,8 @@ fn settings<'a>(
     }
 }
 
-/// The figures of one half of the exemplar beside the other: left and right halves (cut 0) or upper and lower ones (cut 1).
+/// The figures of one half of the exemplar beside the other: left and right halves (cut 0) or upper and lower ones (cut
+/// 1).
 fn halves_compared(
     exemplar: &[ArrayView3<'_, f32>],
     cut: u8,

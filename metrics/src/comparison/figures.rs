@@ -3,16 +3,19 @@
 /// One measure of a solid and its exemplar.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figure {
-    /// Value of the solid's slices; `None` if it cannot be measured (no fringe inside a slice, slices smaller than the patches).
+    /// Value of the solid's slices; `None` if it cannot be measured (no fringe inside a slice, slices smaller than the
+    /// patches).
     pub value: Option<f64>,
     /// Value of a perfect solid: 0 for a distance, 1 for a ratio, else the exemplar's own value.
     pub ideal: Option<f64>,
-    /// Distance from the ideal of one half of the exemplar compared with the other, mean over left and right halves and upper and lower ones. A solid at that distance cannot be distinguished from the exemplar.
+    /// Distance from the ideal of one half of the exemplar compared with the other, mean over left and right halves and
+    /// upper and lower ones. A solid at that distance cannot be distinguished from the exemplar.
     pub floor: Option<f64>,
 }
 
 impl Figure {
-    /// Distance of the value from the ideal, in floors: at most about 1 if the solid cannot be distinguished from the exemplar.
+    /// Distance of the value from the ideal, in floors: at most about 1 if the solid cannot be distinguished from the
+    /// exemplar.
     ///
     /// ```
     /// use stereology_metrics::Figure;

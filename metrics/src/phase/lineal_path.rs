@@ -2,14 +2,16 @@
 
 use ndarray::{ArrayView2, Axis};
 
-/// Probability that a segment of `z` pixels' length, at a random place along an axis, lies wholly in the phase: entry z, 0 to `reach`; entry 0 is the phase's fraction.
+/// Probability that a segment of `z` pixels' length, at a random place along an axis, lies wholly in the phase: entry
+/// z, 0 to `reach`; entry 0 is the phase's fraction.
 ///
 /// A segment of length z covers the centres of z + 1 pixels. Entries longer than the image are 0.
 ///
 /// # Formula
 ///
 /// ```text
-/// L(z) = P(segment of length z in the phase)      outside overlapping discs of radius R, λ per area: exp(−λ (π R² + 2 R z))
+/// L(z) = P(segment of length z in the phase)
+/// outside overlapping discs of radius R, λ per area: L(z) = exp(−λ (π R² + 2 R z))
 /// ```
 ///
 /// # References
@@ -41,9 +43,11 @@ pub fn lineal_path(phase: ArrayView2<'_, bool>, along: Axis, reach: usize) -> Ve
         .collect()
 }
 
-/// Lengths in pixels of the chords that lines along an axis cut from the phase. Chords that reach the image's border are left out, since their length is unknown.
+/// Lengths in pixels of the chords that lines along an axis cut from the phase. Chords that reach the image's border
+/// are left out, since their length is unknown.
 ///
-/// Outside overlapping discs (Poisson) chord lengths are exponential with mean 1 / (2 R λ). Long chords reach the border more often, so the lengths found are biased towards short ones.
+/// Outside overlapping discs (Poisson) chord lengths are exponential with mean 1 / (2 R λ). Long chords reach the
+/// border more often, so the lengths found are biased towards short ones.
 ///
 /// ```
 /// use ndarray::{Axis, array};

@@ -4,7 +4,8 @@ use ndarray::{Array2, ArrayView2};
 
 /// Fractions of the phase in all squares of `side` pixels, by the place of their first corner; empty if no square fits.
 ///
-/// Over a large image their mean is the phase's fraction φ, and their variance falls from φ (1 − φ) at side 1 as the side grows; it falls more slowly in a coarser material.
+/// Over a large image their mean is the phase's fraction φ, and their variance falls from φ (1 − φ) at side 1 as the
+/// side grows; it falls more slowly in a coarser material.
 ///
 /// # References
 ///

@@ -3,15 +3,18 @@
 use ndarray::{Array, ArrayView, Dimension};
 use realfft::RealFftPlanner;
 
-/// Fraction of the pairs of samples at displacement d, both inside the field, that are both in the phase. The field is not wrapped around.
+/// Fraction of the pairs of samples at displacement d, both inside the field, that are both in the phase. The field is
+/// not wrapped around.
 ///
-/// Displacement d has the entry `reach + d` along each axis, |d| ≤ `reach`; a reach beyond the field is reduced to its last sample. An empty field gives an empty map. The counts of pairs
-/// are exact. Cost: N log N, N the number of samples of the field extended by `reach` along each axis.
+/// Displacement d has the entry `reach + d` along each axis, |d| ≤ `reach`; a reach beyond the field is reduced to its
+/// last sample. An empty field gives an empty map. The counts of pairs are exact. Cost: N log N, N the number of
+/// samples of the field extended by `reach` along each axis.
 ///
 /// # Formula
 ///
 /// ```text
-/// S2(d) = Σ u(x) u(x + d) / Π (nₖ − |dₖ|)        u: 1 in the phase, else 0;  S2(0) = φ, the phase's fraction;  S2(far) → φ²
+/// S2(d) = Σ u(x) u(x + d) / Π (nₖ − |dₖ|)        u: 1 in the phase, else 0
+/// S2(0) = φ, the phase's fraction;  S2(far) → φ²
 /// overlapping spheres (radius R, λ per volume), outside of them:
 /// S2(r) = exp(−λ (4π/3) R³ (1 + 3r/4R − r³/16R³))   for r < 2R, then φ²
 /// ```
@@ -35,8 +38,8 @@ pub fn two_point<D: Dimension>(phase: ArrayView<'_, bool, D>, reach: usize) -> A
         return Array::zeros(shape);
     }
     let reaches: Vec<usize> = sizes.iter().map(|n| reach.min(n - 1)).collect();
-    // Rows one after the other, each followed by `reach` zeros, planes likewise: displacements of the field are displacements along one line then, whose
-    // correlation takes one transform.
+    // Rows one after the other, each followed by `reach` zeros, planes likewise: displacements of the field are
+    // displacements along one line then, whose correlation takes one transform.
     let strides = strides(&sizes, &reaches);
     let line = pair_counts(phase, &strides, &reaches);
     (0..sizes.len()).for_each(|axis| shape[axis] = 2 * reaches[axis] + 1);
@@ -107,7 +110,8 @@ fn indices(entry: usize, sizes: &[usize]) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Means of a map of displacements over rings of whole distances from its middle: entry r averages the displacements of length r − ½ to r + ½, up to the map's nearest border.
+/// Means of a map of displacements over rings of whole distances from its middle: entry r averages the displacements of
+/// length r − ½ to r + ½, up to the map's nearest border.
 ///
 /// ```
 /// use ndarray::Array2;

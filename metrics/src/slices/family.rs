@@ -6,7 +6,8 @@ use std::str::FromStr;
 
 /// Parallel planes through a volume, named by the axes that lie in them.
 ///
-/// Rows of a slice run along z and columns along x or y, so that flat layers of the volume are horizontal in it; on `Xy` rows run along y and columns along x.
+/// Rows of a slice run along z and columns along x or y, so that flat layers of the volume are horizontal in it; on
+/// `Xy` rows run along y and columns along x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Constant y: rows along z, columns along x.

@@ -6,8 +6,8 @@ use ndarray::{ArrayView2, ArrayView3, ArrayView4, Axis};
 
 use super::family::{Family, sections};
 
-/// The largest rectangle of pixels (rows, columns) that lies wholly inside a mask, by its shorter side and then its area; `None` if no pixel is inside. Of equal rectangles the first is returned.
-/// Cost: linear in the pixels.
+/// The largest rectangle of pixels (rows, columns) that lies wholly inside a mask, by its shorter side and then its
+/// area; `None` if no pixel is inside. Of equal rectangles the first is returned. Cost: linear in the pixels.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -47,9 +47,11 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
     best
 }
 
-/// The slices of one family, each cut to the [`largest_rectangle`] inside a mask (z, y, x) of the volume's size, so that a solid that fills a mesh is measured without the empty space around it.
+/// The slices of one family, each cut to the [`largest_rectangle`] inside a mask (z, y, x) of the volume's size, so
+/// that a solid that fills a mesh is measured without the empty space around it.
 ///
-/// Slices whose rectangle has a shorter side under `least` pixels, or under half of the family's greatest, are left out. Empty if the mask and the volume have different sizes.
+/// Slices whose rectangle has a shorter side under `least` pixels, or under half of the family's greatest, are left
+/// out. Empty if the mask and the volume have different sizes.
 ///
 /// # Examples
 ///
@@ -57,7 +59,8 @@ pub fn largest_rectangle(mask: ArrayView2<'_, bool>) -> Option<(Range<usize>, Ra
 /// use ndarray::{Array3, Array4};
 /// use stereology_metrics::{Family, sections_inside};
 ///
-/// let ball = Array3::from_shape_fn((41, 41, 41), |(z, y, x)| [z, y, x].iter().map(|&c| (c as f64 - 20.0).powi(2)).sum::<f64>() < 400.0);
+/// let square = |i: usize| (i as f64 - 20.0).powi(2);
+/// let ball = Array3::from_shape_fn((41, 41, 41), |(z, y, x)| square(z) + square(y) + square(x) < 400.0);
 /// let stone = Array4::from_shape_fn((41, 41, 41, 1), |(z, y, x, _)| if ball[[z, y, x]] { 0.5 } else { 0.0 });
 /// let slices = sections_inside(stone.view(), ball.view(), Family::Xz, 8);
 /// assert_eq!(slices.len(), 35);

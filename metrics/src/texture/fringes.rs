@@ -16,11 +16,14 @@ pub struct Fringes {
     pub ends: usize,
 }
 
-/// The fringes of an image that was filtered to a band about one `period` (pixels): its level curves at 0, cut where they turn back.
+/// The fringes of an image that was filtered to a band about one `period` (pixels): its level curves at 0, cut where
+/// they turn back.
 ///
-/// A level curve runs along one flank of a fringe, turns around its end and returns along the other flank. It is cut at the turn, which is where the ends of a piece as long as the period are
-/// less than .7 periods from each other. Curves that close without a turn, pieces shorter than a period, and pieces that reach the image's border do not count among `lengths`. Long fringes reach
-/// the border more often, so `lengths` is biased towards short ones and images are compared in windows of one size. [`Fringes::mean_length_by_ends`] does not have this bias.
+/// A level curve runs along one flank of a fringe, turns around its end and returns along the other flank. It is cut at
+/// the turn, which is where the ends of a piece as long as the period are less than .7 periods from each other. Curves
+/// that close without a turn, pieces shorter than a period, and pieces that reach the image's border do not count among
+/// `lengths`. Long fringes reach the border more often, so `lengths` is biased towards short ones and images are
+/// compared in windows of one size. [`Fringes::mean_length_by_ends`] does not have this bias.
 ///
 /// # References
 ///
@@ -74,7 +77,8 @@ impl Fringes {
         mean(&self.tortuosities)
     }
 
-    /// Mean length without the bias of the window: every fringe has two ends, so the mean is twice the total length over the number of ends. `None` without ends.
+    /// Mean length without the bias of the window: every fringe has two ends, so the mean is twice the total length
+    /// over the number of ends. `None` without ends.
     ///
     /// ```
     /// use stereology_metrics::Fringes;
@@ -100,7 +104,8 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The pieces of a curve between its turns, and how many ends of each lie inside the image. A closed curve without a turn is not a fringe.
+/// The pieces of a curve between its turns, and how many ends of each lie inside the image. A closed curve without a
+/// turn is not a fringe.
 fn pieces(curve: &LevelCurve, period: f64) -> Vec<(LevelCurve, usize)> {
     let points = &curve.points;
     let n = points.len();

@@ -2,9 +2,11 @@
 
 use ndarray::Array2;
 
-/// Mean length of the gradient by forward differences, grey levels per pixel; the last row and column have none. Zero for images less than two pixels wide or high.
+/// Mean length of the gradient by forward differences, grey levels per pixel; the last row and column have none. Zero
+/// for images less than two pixels wide or high.
 ///
-/// If the ratio of a solid's mean gradient to its exemplar's is below 1, the solid is blurred; if it is above 1, the solid is noisier or has seams.
+/// If the ratio of a solid's mean gradient to its exemplar's is below 1, the solid is blurred; if it is above 1, the
+/// solid is noisier or has seams.
 ///
 /// ```
 /// use ndarray::Array2;

@@ -49,7 +49,8 @@ pub fn histogram(values: impl IntoIterator<Item = f32>, bins: usize) -> Vec<f64>
 /// # Formula
 ///
 /// ```text
-/// KL(p || q) = Σ p ln(p / q)        1e-6 is added to every bin of p and q before they are normalised, so that an empty bin gives a large but finite value
+/// KL(p || q) = Σ p ln(p / q)
+/// 1e-6 is added to every bin of p and q before they are normalised, so that an empty bin gives a finite value
 /// ```
 ///
 /// # References

@@ -2,7 +2,8 @@
 
 use ndarray::Array2;
 
-/// A curve along which a field has one value. Points are (x, y) in pixels; the sample (row, column) lies at (column, row).
+/// A curve along which a field has one value. Points are (x, y) in pixels; the sample (row, column) lies at (column,
+/// row).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelCurve {
     /// Its points in order; the first is not repeated at the end of a closed curve.
@@ -11,7 +12,8 @@ pub struct LevelCurve {
     pub closed: bool,
 }
 
-/// The curves on which the field has the value `level`, in a fixed order. Where the corners of a square alternate, their mean decides which are joined. Cost: linear.
+/// The curves on which the field has the value `level`, in a fixed order. Where the corners of a square alternate,
+/// their mean decides which are joined. Cost: linear.
 ///
 /// # Examples
 ///
@@ -63,7 +65,8 @@ pub fn level_curves(field: &Array2<f64>, level: f64) -> Vec<LevelCurve> {
                 [a, b] => link(a, b),
                 [_, _, _, _] => {
                     let mean = (field[[y, x]] + field[[y, x + 1]] + field[[y + 1, x]] + field[[y + 1, x + 1]]) / 4.0;
-                    // The middle is connected with the two corners on its side of the level; the curves separate the other two.
+                    // The middle is connected with the two corners on its side of the level; the curves separate the
+                    // other two.
                     if corners[0] == (mean > level) {
                         link(top, right);
                         link(bottom, left);
@@ -122,7 +125,8 @@ impl LevelCurve {
         }
     }
 
-    /// Length over the distance from end to end: 1 for a straight line, π/2 for a half circle. `None` for closed curves.
+    /// Length over the distance from end to end: 1 for a straight line, π/2 for a half circle. `None` for closed
+    /// curves.
     ///
     /// ```
     /// use std::f64::consts::PI;

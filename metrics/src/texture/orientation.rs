@@ -87,7 +87,8 @@ pub fn orientation_field(image: &Array2<f32>) -> OrientationField {
 }
 
 impl OrientationField {
-    /// Fractions of directions in `bins` equal bins; the first is centred at 0, so that a wave along an axis lies in the middle of a bin. Flat pixels do not count.
+    /// Fractions of directions in `bins` equal bins; the first is centred at 0, so that a wave along an axis lies in
+    /// the middle of a bin. Flat pixels do not count.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to bins")]
     pub fn histogram(&self, bins: usize) -> Vec<f64> {
@@ -130,7 +131,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
-        /// A plane wave fills the bin of its direction, with coherence 1, up to rounding and the small anisotropy of Sobel's filter.
+        /// A plane wave fills the bin of its direction, with coherence 1, up to rounding and the small anisotropy of
+        /// Sobel's filter.
         #[test]
         fn a_plane_wave_fills_one_bin(degrees in 0.0_f64..180.0, period in 8.0_f64..16.0) {
             let angle = degrees.to_radians();

@@ -15,7 +15,8 @@ pub struct Patches {
 }
 
 impl Patches {
-    /// Draws `count` patches of `side` pixels at random places of the images; each image is drawn in proportion to its number of places. Empty if no patch fits.
+    /// Draws `count` patches of `side` pixels at random places of the images; each image is drawn in proportion to its
+    /// number of places. Empty if no patch fits.
     #[must_use]
     pub fn draw(images: &[ArrayView3<'_, f32>], side: usize, count: usize, seed: u64) -> Self {
         let places =
@@ -73,11 +74,11 @@ impl Patches {
     }
 }
 
-/// Sliced Wasserstein distance of two sets of patches: the mean, over random unit directions, of the Wasserstein-1 distance of the patches projected on each. `None` if a set is empty or their
-/// dimensions differ.
+/// Sliced Wasserstein distance of two sets of patches: the mean, over random unit directions, of the Wasserstein-1
+/// distance of the patches projected on each. `None` if a set is empty or their dimensions differ.
 ///
-/// It is sensitive to every difference of the projected distributions: blur, contrast, grain size and shapes. Two random draws of finite size never have distance 0; compare the value with that of two
-/// parts of the exemplar.
+/// It is sensitive to every difference of the projected distributions: blur, contrast, grain size and shapes. Two
+/// random draws of finite size never have distance 0; compare the value with that of two parts of the exemplar.
 ///
 /// # Formula
 ///

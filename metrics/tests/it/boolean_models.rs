@@ -19,7 +19,8 @@ fn poisson(rng: &mut ChaCha8Rng, mean: f64) -> usize {
     }
 }
 
-/// True outside discs of radius `radius`, `density` per unit of area; discs whose centres lie outside the image overlap it too.
+/// True outside discs of radius `radius`, `density` per unit of area; discs whose centres lie outside the image overlap
+/// it too.
 fn outside_discs(side: usize, radius: f64, density: f64, seed: u64) -> Array2<bool> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let wide = side as f64 + 2.0 * radius;
@@ -108,7 +109,8 @@ fn lineal_path_and_chords_of_overlapping_discs() {
             );
         }
     }
-    // Exponential chord lengths of rate c, in whole pixels, short compared with the image: the mean of those over m pixels is m + 1/c.
+    // Exponential chord lengths of rate c, in whole pixels, short compared with the image: the mean of those over m
+    // pixels is m + 1/c.
     let c = 2.0 * RADIUS * DENSITY;
     let means: Vec<Vec<f64>> = all
         .iter()

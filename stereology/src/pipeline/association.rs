@@ -14,7 +14,8 @@ pub struct Association {
 /// Below this p-value size and group are taken to be associated.
 pub const SIGNIFICANT: f64 = 0.01;
 
-/// Tests whether `groups` of sizes have the same distribution ([`kruskal_wallis`]); groups of fewer than five sizes are left out.
+/// Tests whether `groups` of sizes have the same distribution ([`kruskal_wallis`]); groups of fewer than five sizes are
+/// left out.
 ///
 /// ```
 /// use stereology::pipeline::association;

@@ -4,10 +4,13 @@ use ndarray::{Array4, ArrayView3, Axis, Zip};
 use stereology_exemplar::{Domain, Exemplar, FixedVoxel, SolidError, SolidOptions, finish_solid};
 use stereology_grow::{Grown, Progress};
 
-/// Removes the seams between the cells of grown stone: `iterations` of [`Method::Best`](stereology_exemplar::Method::Best) at each of its levels. The coarsest level starts with the grown stone, and measured voxels are fixed.
+/// Removes the seams between the cells of grown stone: `iterations` of
+/// [`Method::Best`](stereology_exemplar::Method::Best) at each of its levels. The coarsest level starts with the grown
+/// stone, and measured voxels are fixed.
 ///
-/// `mask`, `exemplar` and `measured` are those of [`grow`](stereology_grow::grow). Every voxel except the measured ones is a texel of the exemplar again. Slices of constant y, x and z look like the exemplar in its given orientation, so the
-/// pass is for stone without a preferred direction. Cost: about 3 µs per voxel, iteration and core.
+/// `mask`, `exemplar` and `measured` are those of [`grow`](stereology_grow::grow). Every voxel except the measured ones
+/// is a texel of the exemplar again. Slices of constant y, x and z look like the exemplar in its given orientation, so
+/// the pass is for stone without a preferred direction. Cost: about 3 µs per voxel, iteration and core.
 ///
 /// # Errors
 ///

@@ -16,8 +16,9 @@ pub struct CompareOptions {
     pub band: Option<BandPass>,
 }
 
-/// Compares the slices of a solid with an exemplar by [`compare`]. The bright phase is what lies above Otsu's threshold of the exemplar; fringes are followed in the band in which the exemplar's middle image
-/// is strongest, unless a band is given.
+/// Compares the slices of a solid with an exemplar by [`compare`]. The bright phase is what lies above Otsu's threshold
+/// of the exemplar; fringes are followed in the band in which the exemplar's middle image is strongest, unless a band
+/// is given.
 ///
 /// # Errors
 ///

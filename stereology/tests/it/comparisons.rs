@@ -49,7 +49,8 @@ fn an_image_equals_itself() {
     }
 }
 
-/// The figures of another image of the same material are within the floors; less contrast and another direction change the figure that measures them.
+/// The figures of another image of the same material are within the floors; less contrast and another direction change
+/// the figure that measures them.
 #[test]
 fn each_figure_shows_its_fault() {
     let (exemplar, other) = (texture(128, 128, 1), texture(128, 128, 2));
@@ -100,7 +101,8 @@ fn fringes_are_distinguished() {
     assert!(wavy.value.unwrap() > wavy.ideal.unwrap() + 0.01, "{wavy:?}");
 }
 
-/// A shift of all grey levels by c moves d-dimensional patches by c √d along the diagonal; projected on a random direction this is c √d |u₁|, whose mean is known.
+/// A shift of all grey levels by c moves d-dimensional patches by c √d along the diagonal; projected on a random
+/// direction this is c √d |u₁|, whose mean is known.
 #[test]
 fn sliced_wasserstein_of_a_shift() {
     let picture = texture(80, 80, 3);
@@ -119,7 +121,8 @@ fn sliced_wasserstein_of_a_shift() {
     );
 }
 
-/// White noise of two contrasts: on every direction it projects to normal distributions of standard deviations s and t, whose distance is |s − t| √(2/π).
+/// White noise of two contrasts: on every direction it projects to normal distributions of standard deviations s and t,
+/// whose distance is |s − t| √(2/π).
 #[test]
 fn sliced_wasserstein_of_two_contrasts() {
     let noise = |spread: f32, seed: u64| {

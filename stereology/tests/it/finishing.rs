@@ -33,7 +33,8 @@ fn grown(mask: &Array3<bool>, measured: &[([usize; 3], Vec<f32>)], options: &Gro
     grow(mask.view(), stone(64).view(), measured, options, &go).unwrap()
 }
 
-/// The finishing pass removes the seams of cells; measurements and voxels outside the mask keep their values, and all others are texels of the exemplar.
+/// The finishing pass removes the seams of cells; measurements and voxels outside the mask keep their values, and all
+/// others are texels of the exemplar.
 #[test]
 fn finishing_removes_seams() {
     let mask = Array3::from_shape_fn((24, 24, 24), |(z, y, x)| z + y + x < 60);

@@ -14,7 +14,8 @@ pub enum Connectivity {
     Corners,
 }
 
-/// Connected components (4 neighbours) of equal, chosen values of an image, axes (y, x): a number from 1 for each, in order of their first pixel, and 0 elsewhere; and how many there are.
+/// Connected components (4 neighbours) of equal, chosen values of an image, axes (y, x): a number from 1 for each, in
+/// order of their first pixel, and 0 elsewhere; and how many there are.
 ///
 /// # Complexity
 ///
@@ -160,7 +161,8 @@ impl Runs {
         }
     }
 
-    /// Joins the runs of `row`, from number `first` on, with those of an earlier row that they touch and whose value is the same.
+    /// Joins the runs of `row`, from number `first` on, with those of an earlier row that they touch and whose value is
+    /// the same.
     fn join_touching<T: PartialEq + Copy>(
         &mut self,
         first: usize,
@@ -188,7 +190,8 @@ impl Runs {
         }
     }
 
-    /// The component of every run, from 1, and how many there are. The first run of a component is its root, so components are numbered by their first pixels.
+    /// The component of every run, from 1, and how many there are. The first run of a component is its root, so
+    /// components are numbered by their first pixels.
     fn numbered(&mut self) -> (Vec<u32>, u32) {
         let mut count = 0;
         let mut numbers: Vec<u32> = Vec::with_capacity(self.runs.len());

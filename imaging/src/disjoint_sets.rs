@@ -4,7 +4,8 @@
 ///
 /// # Complexity
 ///
-/// Paths are halved on every search, so that m operations on n numbers take O(m log n) at worst and close to O(m) in practice.
+/// Paths are halved on every search, so that m operations on n numbers take O(m log n) at worst and close to O(m) in
+/// practice.
 ///
 /// # References
 ///
@@ -98,7 +99,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Two numbers have the same root exactly if a chain of pairs leads from one to the other; the root is the smallest number of its set.
+        /// Two numbers have the same root exactly if a chain of pairs leads from one to the other; the root is the
+        /// smallest number of its set.
         #[test]
         fn roots_are_the_smallest_numbers_that_can_be_reached(pairs in prop::collection::vec((0_u32..30, 0_u32..30), 0..40)) {
             let mut sets = DisjointSets::new(30);

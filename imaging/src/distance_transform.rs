@@ -3,7 +3,8 @@
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, Zip};
 use rayon::prelude::*;
 
-/// Euclidean distance of every pixel of a mask, axes (y, x), to the nearest pixel outside it, in pixels; 0 outside. The edge of the image does not count as outside. Infinite if the mask is everything.
+/// Euclidean distance of every pixel of a mask, axes (y, x), to the nearest pixel outside it, in pixels; 0 outside. The
+/// edge of the image does not count as outside. Infinite if the mask is everything.
 ///
 /// Distances along columns are counted in f32; the rest is exact up to the rounding of the result to f32.
 ///
@@ -50,8 +51,9 @@ pub fn distance_transform(mask: ArrayView2<'_, bool>) -> Array2<f32> {
     out
 }
 
-/// Square of the Euclidean distance of every voxel of a mask, axes (z, y, x), to the nearest voxel outside it, in voxels; 0 outside. The faces of the volume do not count as outside. Infinite if the mask is
-/// everything. An image is a volume of one layer.
+/// Square of the Euclidean distance of every voxel of a mask, axes (z, y, x), to the nearest voxel outside it, in
+/// voxels; 0 outside. The faces of the volume do not count as outside. Infinite if the mask is everything. An image is
+/// a volume of one layer.
 ///
 /// Exact: squares of distances are whole numbers.
 ///
@@ -98,7 +100,8 @@ pub fn squared_distance_transform(mask: ArrayView3<'_, bool>) -> Array3<f64> {
     out
 }
 
-/// Euclidean distance of every voxel of a volume of two regions, axes (z, y, x), to the nearest voxel of the other region, in voxels; infinite if there is one region only. An image is a volume of one layer.
+/// Euclidean distance of every voxel of a volume of two regions, axes (z, y, x), to the nearest voxel of the other
+/// region, in voxels; infinite if there is one region only. An image is a volume of one layer.
 ///
 /// # Complexity
 ///
@@ -137,8 +140,9 @@ struct Envelope {
 }
 
 impl Envelope {
-    /// Replaces the distances f(q) at the points of a line, given by their squares, by the least √((p − q)² + f(q)²). Between two points at distance 0 no point farther away can be nearer, so each stretch
-    /// between them is worked on alone.
+    /// Replaces the distances f(q) at the points of a line, given by their squares, by the least √((p − q)² + f(q)²).
+    /// Between two points at distance 0 no point farther away can be nearer, so each stretch between them is worked on
+    /// alone.
     fn apply<T: Copy>(&mut self, line: &mut [T], square: impl Fn(&T) -> f64, of_square: impl Fn(f64) -> T) {
         let width = line.len();
         let is_inside = |value: &T| square(value) > 0.0;

@@ -3,7 +3,8 @@
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use rayon::prelude::*;
 
-/// Gaussian filter of an image of one channel, axes (y, x): standard deviation `sigma` pixels, truncated at 4 sigma, the image mirrored at its edges. Zero leaves it as it is.
+/// Gaussian filter of an image of one channel, axes (y, x): standard deviation `sigma` pixels, truncated at 4 sigma,
+/// the image mirrored at its edges. Zero leaves it as it is.
 ///
 /// # Complexity
 ///
@@ -186,7 +187,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Two passes along lines give the sum over the plane, also where the kernel is longer than the image; channels do not mix.
+        /// Two passes along lines give the sum over the plane, also where the kernel is longer than the image; channels
+        /// do not mix.
         #[test]
         fn two_passes_are_the_sum_over_the_plane(width in 1_usize..12, values in prop::collection::vec(0.0_f32..1.0, 1..90), sigma in 0.3_f32..3.0) {
             let height = values.len() / width;

@@ -1,11 +1,13 @@
-//! Operations on pixel and voxel grids that several crates need: distance transform, Otsu threshold, connected components, Gaussian filter, colour spaces.
+//! Operations on pixel and voxel grids that several crates need: distance transform, Otsu threshold, connected
+//! components, Gaussian filter, colour spaces.
 //!
-//! Every function takes plain values (`ndarray` views, slices, `[f32; 3]` colours) and cannot fail. Images have axes (y, x), volumes (z, y, x). The tests compare
-//! each function with a closed form or with a brute-force search.
+//! Every function takes plain values (`ndarray` views, slices, `[f32; 3]` colours) and cannot fail. Images have axes
+//! (y, x), volumes (z, y, x). The tests compare each function with a closed form or with a brute-force search.
 //!
 //! # Examples
 //!
-//! The particles of a grey image: a threshold, the connected components above it, and the depth of the deepest pixel of each.
+//! The particles of a grey image: a threshold, the connected components above it, and the depth of the deepest pixel of
+//! each.
 //!
 //! ```
 //! use ndarray::Array2;

@@ -1,12 +1,15 @@
 //! Otsu's threshold.
 
-/// Otsu's threshold of a histogram of grey levels: it divides the values into two classes so that the variance between the classes is largest (and that within them smallest). Values above it are the bright
-/// class. `counts[v]` is how many values have level v; the threshold is in levels. `None` if fewer than two levels occur.
+/// Otsu's threshold of a histogram of grey levels: it divides the values into two classes so that the variance between
+/// the classes is largest (and that within them smallest). Values above it are the bright class. `counts[v]` is how
+/// many values have level v; the threshold is in levels. `None` if fewer than two levels occur.
 ///
 /// # Ties
 ///
-/// All thresholds between the brightest value of the dark class and the darkest value of the bright class divide the values alike. The middle between the two is returned: it has the widest margin on both
-/// sides, so it suits other images of the same scene too, and inverting the grey levels inverts it. Where different divisions are equally good, as of symmetric histograms, the one with fewer dark values is taken.
+/// All thresholds between the brightest value of the dark class and the darkest value of the bright class divide the
+/// values alike. The middle between the two is returned: it has the widest margin on both sides, so it suits other
+/// images of the same scene too, and inverting the grey levels inverts it. Where different divisions are equally good,
+/// as of symmetric histograms, the one with fewer dark values is taken.
 ///
 /// # Formula
 ///

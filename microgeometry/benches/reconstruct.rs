@@ -1,4 +1,4 @@
-//! Labels on spheres of 5,000 to 82,000 triangles: the exponent of time.
+//! Labels on spheres of 5,000 to 82,000 triangles: the time as a power of the number of triangles.
 
 #![allow(missing_docs, reason = "made by criterion's macro")]
 

@@ -1,4 +1,4 @@
-//! A drawn texture put on a ball: `cargo run --release -p stereology-microgeometry --example relief`.
+//! Relief on a ball from a synthetic test image: `cargo run --release -p stereology-microgeometry --example relief`.
 
 #![allow(clippy::print_stdout, reason = "a program")]
 
@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 use ndarray::Array2;
 use stereology_microgeometry::{
-    EstimateOptions, ReconstructOptions, contact_of_picture, displace, reconstruct, to_distribution_units,
+    EstimateOptions, ReconstructOptions, contact_of_image, displace, reconstruct, to_distribution_units,
 };
 use stereology_shape::TriangleMesh;
 
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let radius = 7.0 + ((row * 5 + column * 3) % 7) as f64;
         ((y % 30) as f64 - 14.5).hypot((x % 30) as f64 - 14.5) < radius
     });
-    let contact = contact_of_picture(picture.view(), &EstimateOptions::default())?;
+    let contact = contact_of_image(picture.view(), &EstimateOptions::default())?;
     let ball = TriangleMesh::icosphere(2.0, 5);
     let scaled = to_distribution_units(&ball, 60.0)?;
     let made = reconstruct(&scaled, &contact, &ReconstructOptions::default(), &|_| {

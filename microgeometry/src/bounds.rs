@@ -1,13 +1,16 @@
-//! What the labels given so far allow the other triangles: lower and upper bounds, spread over the surface as far as they matter.
+//! Lower and upper bounds that the labels assigned so far impose on the other triangles, propagated over the surface as
+//! far as they matter.
 
 use crate::budget::Levels;
 use crate::conversions::{index, whole_part};
 use crate::dual::DualGraph;
 use crate::wavefront::Wavefront;
 
-/// One region while its labels are given, seen as if it were the positive one: the negative region's labels and bounds have their signs changed.
+/// One region during labelling, as if it were the positive one: labels and bounds of the negative region have their
+/// signs changed.
 ///
-/// `bound[i]` = max over the region's labels of x − d, the least that triangle i can have. A triangle with bound in level q, and none given above, must get a label of level q: it is *forced*, and takes room there.
+/// `bound[i]` = max over the region's labels of x − d, the least label that triangle i can have. An unlabelled triangle
+/// with a bound in level q must get a label of level q or above: it is *forced*, and takes room in level q.
 pub(crate) struct Region<'a> {
     graph: &'a DualGraph,
     weights: &'a [i64],
@@ -18,13 +21,13 @@ pub(crate) struct Region<'a> {
     counted: Vec<u32>,
     /// Weight forced into each level.
     forced: Vec<i64>,
-    /// Triangles that came to be forced into each level; some have left it since.
+    /// Triangles that were forced into each level; some have left it since.
     came: Vec<Vec<u32>>,
-    /// What a level may be overfilled by.
+    /// By how much a level may be overfilled.
     tolerance: i64,
     front: Wavefront,
     undo: Vec<Change>,
-    /// Steps looked at since this was last set to zero.
+    /// Steps examined since this was last set to zero.
     pub(crate) work: u64,
 }
 
@@ -38,12 +41,12 @@ struct Change {
 /// How much may be forced into each level.
 pub(crate) struct Limit<'a> {
     pub(crate) room: &'a Levels,
-    /// Levels below this one may take room that is left above them, and of it that much; 0: none may.
+    /// Levels below this one may use room left in the levels above them; 0: none may.
     pub(crate) below: usize,
     pub(crate) spare: i64,
 }
 
-/// Buckets as narrow as half an edge, a whole number of them a level.
+/// Buckets at most half an edge wide, a whole number of them per level.
 fn bucket(graph: &DualGraph, height: f64) -> f64 {
     height / (2.0 * height / graph.mean_length()).ceil().clamp(1.0, 512.0)
 }
@@ -68,7 +71,7 @@ impl<'a> Region<'a> {
         }
     }
 
-    /// Forgets what was counted, for the next piece of the mesh.
+    /// Clears the counts for the next component of the mesh.
     pub(crate) fn clear_counts(&mut self) {
         self.forced.fill(0);
         self.came.iter_mut().for_each(Vec::clear);
@@ -84,7 +87,7 @@ impl<'a> Region<'a> {
         come
     }
 
-    /// A triangle has got its label, and is no longer to be counted as forced.
+    /// Marks a triangle as labelled: it no longer counts as forced.
     pub(crate) fn settle(&mut self, t: u32) {
         let counted = std::mem::replace(&mut self.counted[t as usize], 0);
         if counted > 0 {
@@ -92,7 +95,8 @@ impl<'a> Region<'a> {
         }
     }
 
-    /// Labels the triangles `seeds` with `value` and spreads that as far as bounds above `floor` go. Nothing happens and [`Overfull`] is told if that forced more into a level than `limit` lets.
+    /// Labels the triangles `seeds` with `value` and propagates the bounds that exceed `floor`. If that would force
+    /// more into a level than `limit` allows, nothing changes and the result is [`Overfull`].
     pub(crate) fn spread(
         &mut self,
         seeds: &[u32],
@@ -112,7 +116,8 @@ impl<'a> Region<'a> {
             if value < self.bound[t as usize] {
                 continue;
             }
-            // Values come level by level: who leaves a level for a higher one has left before others come.
+            // Values arrive level by level: a triangle that leaves a level for a higher one does so before others
+            // enter.
             if value >= 0.0 && !labelled[t as usize] {
                 let level = whole_part(value / self.height);
                 let counted = self.counted[t as usize] as usize;
@@ -144,7 +149,7 @@ impl<'a> Region<'a> {
         Ok(())
     }
 
-    /// Has the level room for what is forced into it, if need be with what the levels above hand down?
+    /// Whether the level has room for what is forced into it, if necessary with the room left in the levels above.
     fn fits(&self, level: usize, limit: &Limit<'_>) -> bool {
         let over = |q: usize| self.forced[q] - limit.room[q];
         if over(level) <= self.tolerance {

@@ -1,17 +1,18 @@
-//! How much of the mesh each interval of distances gets: the histogram in whole numbers (section 4.3 and figure 9).
+//! The histogram of distances in whole numbers: how much of the mesh each interval gets (section 4.3 and figure 9).
 
 use crate::contact::ContactDistribution;
 use crate::conversions::whole_weight;
 
-/// Units of weight of a mean triangle, where triangles count by area: small enough that rounding does not matter, large enough for a billion triangles.
+/// Units of weight of a mean triangle, where triangles count by area: small enough that rounding does not matter, large
+/// enough for a billion triangles.
 pub(crate) const UNIT: i64 = 1 << 20;
 
-/// What one triangle counts for.
+/// Weights of the triangles.
 pub(crate) fn area_weights(areas: &[f64]) -> Vec<i64> {
     let mean = areas.iter().sum::<f64>() / areas.len() as f64;
     areas
         .iter()
-        // A triangle without area still takes part.
+        // A triangle without area still gets a label.
         .map(|area| whole_weight((area / mean * UNIT as f64).round()).max(1))
         .collect()
 }
@@ -19,7 +20,8 @@ pub(crate) fn area_weights(areas: &[f64]) -> Vec<i64> {
 /// Room in each level of one region; level q holds distances in [q δ, (q+1) δ).
 pub(crate) type Levels = Vec<i64>;
 
-/// Levels of the negative and the positive region: the distribution, every bin cut into `parts` levels, in whole numbers that sum to `total` (largest remainders).
+/// Levels of the negative and the positive region: the distribution, every bin divided into `parts` levels, in whole
+/// numbers that sum to `total` (largest remainders).
 pub(crate) fn levels(of: &ContactDistribution, parts: usize, total: i64) -> [Levels; 2] {
     let shares = [fine_shares(of.negative(), parts), fine_shares(of.positive(), parts)];
     let split = shares[0].len();
@@ -29,7 +31,7 @@ pub(crate) fn levels(of: &ContactDistribution, parts: usize, total: i64) -> [Lev
     [whole, positive]
 }
 
-/// Cuts every bin into parts whose shares follow the slope to its neighbours, and sum to the bin's.
+/// Divides every bin into parts whose frequencies follow the slope to its neighbours and sum to the bin's.
 fn fine_shares(shares: &[f64], parts: usize) -> Vec<f64> {
     let at = |k: isize| -> Option<f64> { usize::try_from(k).ok().and_then(|k| shares.get(k)).copied() };
     (0..shares.len())
@@ -54,7 +56,8 @@ fn fine_shares(shares: &[f64], parts: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Whole numbers proportional to `shares` that sum to `total`: rounded down, and what is missing goes to the largest remainders (ties: the first).
+/// Whole numbers proportional to `shares` that sum to `total`: rounded down, with the remaining units added to the
+/// largest remainders (ties: the first).
 pub(crate) fn largest_remainders(shares: &[f64], total: i64) -> Vec<i64> {
     let sum: f64 = shares.iter().sum();
     if sum <= 0.0 {
@@ -79,7 +82,8 @@ pub(crate) fn largest_remainders(shares: &[f64], total: i64) -> Vec<i64> {
     whole
 }
 
-/// Takes `part` of `whole` out of `rest`: what one piece of the mesh gets. Proportional to what is left, so that the pieces together get exactly all.
+/// Removes `part` from `rest`: the room of one component of the mesh. Proportional to what is left, so that the
+/// components together get exactly everything.
 pub(crate) fn take_share(rest: &mut [Levels; 2], part: i64) -> [Levels; 2] {
     let split = rest[0].len();
     let left: Vec<f64> = rest.iter().flatten().map(|&room| room as f64).collect();
@@ -100,7 +104,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The histogram holds exactly as many labels as there are triangles, whatever the distribution, and each bin is off by less than one.
+        /// The histogram holds exactly as many labels as there are triangles, whatever the distribution, and the error
+        /// of each bin is less than one.
         #[test]
         fn labels_sum_to_triangles(shares in prop::collection::vec(0.0..1.0_f64, 1..40), total in 2..100_000_i64) {
             prop_assume!(shares.iter().sum::<f64>() > 0.0);
@@ -112,7 +117,7 @@ mod tests {
             }
         }
 
-        /// Cutting bins moves nothing out of them.
+        /// The parts of a bin sum to the bin.
         #[test]
         fn parts_sum_to_bins(shares in prop::collection::vec(0.0..1.0_f64, 1..20), parts in 1..9_usize) {
             let fine = fine_shares(&shares, parts);
@@ -122,9 +127,9 @@ mod tests {
             }
         }
 
-        /// Pieces together get all.
+        /// Components together get everything.
         #[test]
-        fn pieces_share_all(sizes in prop::collection::vec(1..2000_i64, 1..30)) {
+        fn components_together_get_everything(sizes in prop::collection::vec(1..2000_i64, 1..30)) {
             let of = ContactDistribution::new(1.0, vec![5.0, 3.0, 1.0], vec![4.0, 2.0]).unwrap();
             let total: i64 = sizes.iter().sum();
             let mut rest = levels(&of, 2, total);

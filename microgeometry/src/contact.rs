@@ -1,4 +1,4 @@
-//! How far the points of two regions lie from the interface between them: a histogram with a sign.
+//! Contact distributions: a signed histogram of how far the points of two regions lie from the interface between them.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,8 +11,9 @@ pub const MOST_BINS: usize = 4096;
 
 /// Radial contact distributions of two regions, merged (section 4.3 and figure 9 of the paper).
 ///
-/// `positive[k]` is the share of all points that lie in the positive region at a distance in [k b, (k+1) b) from the negative one, b the bin width; `negative[k]` likewise in the negative region. All shares sum to 1. Distances are in
-/// *distribution units*: pixels, or what a pixel measures.
+/// `positive[k]` is the fraction of all points that lie in the positive region at a distance in [k b, (k+1) b) from the
+/// negative one, b the bin width; `negative[k]` likewise in the negative region. All fractions sum to 1. Distances are
+/// in *distribution units*: pixels, or the length unit of the pixel size.
 ///
 /// # Examples
 ///
@@ -32,7 +33,7 @@ pub struct ContactDistribution {
     positive: Vec<f64>,
 }
 
-/// As it stands in a file.
+/// The file's structure.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Written {
     #[serde(default)]
@@ -50,7 +51,8 @@ impl ContactDistribution {
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError`] if a frequency is negative or not finite, all are zero, there are more than [`MOST_BINS`], or the width is no length.
+    /// [`MicrogeometryError`] if a frequency is negative or not finite, all are zero, there are more than
+    /// [`MOST_BINS`], or the width is not a positive length.
     pub fn new(bin_width: f64, mut negative: Vec<f64>, mut positive: Vec<f64>) -> Result<Self, MicrogeometryError> {
         if !(bin_width.is_finite() && bin_width > 0.0) {
             return Err(MicrogeometryError::BinWidth(bin_width));
@@ -80,7 +82,7 @@ impl ContactDistribution {
         if !made.total().is_finite() {
             made.scale(largest.recip());
         }
-        // What is normalised already keeps its bits: files are read as they were written.
+        // Normalised frequencies keep their bits, so files are read as they were written.
         if (made.total() - 1.0).abs() > 1e-12 {
             made.scale(made.total().recip());
         }
@@ -101,7 +103,7 @@ impl ContactDistribution {
     ///
     /// # Errors
     ///
-    /// As [`ContactDistribution::new`]; a distance that is not finite counts as a bin too far.
+    /// As [`ContactDistribution::new`]; a distance that is not finite counts as beyond the last bin.
     pub fn from_distances(
         bin_width: f64,
         distances: impl IntoIterator<Item = (f64, f64)>,
@@ -136,25 +138,26 @@ impl ContactDistribution {
         self.bin_width
     }
 
-    /// Shares of the negative region, from the interface outwards.
+    /// Fractions of the negative region, from the interface outwards.
     #[must_use]
     pub fn negative(&self) -> &[f64] {
         &self.negative
     }
 
-    /// Shares of the positive region, from the interface outwards.
+    /// Fractions of the positive region, from the interface outwards.
     #[must_use]
     pub fn positive(&self) -> &[f64] {
         &self.positive
     }
 
-    /// Share of the positive region.
+    /// Area fraction (volume fraction) of the positive region.
     #[must_use]
     pub fn positive_share(&self) -> f64 {
         self.positive.iter().sum()
     }
 
-    /// The positive region's own contact distribution: the probability that a point of it is nearer than r = b, 2 b, ... to the negative one (eq. 1 of the paper).
+    /// The positive region's own contact distribution: the probability that a point of it is nearer than r = b, 2 b,
+    /// ... to the negative one (eq. 1 of the paper).
     #[must_use]
     pub fn positive_contact(&self) -> Vec<f64> {
         cumulated(&self.positive)
@@ -166,11 +169,11 @@ impl ContactDistribution {
         cumulated(&self.negative)
     }
 
-    /// With distances multiplied by `factor`: a material magnified.
+    /// With distances multiplied by `factor`: the material magnified.
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::BinWidth`] if no positive finite width comes out.
+    /// [`MicrogeometryError::BinWidth`] if the resulting width is not positive and finite.
     pub fn magnified(&self, factor: f64) -> Result<Self, MicrogeometryError> {
         Self::new(self.bin_width * factor, self.negative.clone(), self.positive.clone())
     }
@@ -185,7 +188,8 @@ impl ContactDistribution {
         }
     }
 
-    /// One bin given another share before all are normalised again (the paper's design tool, section 5.2): `bin` 0, 1, ... in the positive region, −1, −2, ... in the negative one.
+    /// With one bin set to another fraction before all are normalised again (the paper's design tool, section 5.2):
+    /// `bin` 0, 1, ... in the positive region, −1, −2, ... in the negative one.
     ///
     /// # Errors
     ///
@@ -238,12 +242,13 @@ impl ContactDistribution {
         )
     }
 
-    /// Earth mover's distance between two distributions, in bins of this one: the mean distance, in bins, by which one must be moved to become the other. Both need the same bin width.
+    /// Earth mover's distance between two distributions, in bins of this one: the least mean distance, in bins, over
+    /// which points must move to turn one into the other. Both need the same bin width.
     ///
     /// # Formula
     ///
     /// ```text
-    /// EMD = Σ |F(k) − G(k)|      over the signed bins k; F and G are the cumulative fractions
+    /// EMD = Σ |F(k) − G(k)|      over the signed bins k, F and G the cumulative fractions
     /// ```
     ///
     /// ```
@@ -300,7 +305,7 @@ impl ContactDistribution {
     pub fn from_json(text: &str) -> Result<Self, MicrogeometryError> {
         let written: Written = serde_json::from_str(text).map_err(|error| {
             MicrogeometryError::File(format!(
-                "is no contact distribution ({error}); it holds `bin_width`, `negative` and `positive`, as `stereology contact` writes them"
+                "not a contact distribution ({error}): it needs `bin_width`, `negative` and `positive`"
             ))
         })?;
         Self::new(written.bin_width, written.negative, written.positive)

@@ -1,11 +1,13 @@
 //! Conversions to narrower numbers, each with the bound that makes it exact or the rounding it stands for.
 
-/// Number of a triangle or vertex in 32 bits, as meshes number their vertices. A graph of more than 2²⁸ steps is refused before triangles are numbered in it.
+/// Number of a triangle or vertex in 32 bits, as meshes number their vertices. A graph of more than 2²⁸ steps is
+/// refused before triangles are numbered in it.
 pub(crate) fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
 
-/// Whole part of a number; 0 of negative numbers and of those that are not numbers, the largest index of those beyond it.
+/// Whole part of a number; 0 of negative numbers and of those that are not numbers, the largest index of those beyond
+/// it.
 #[allow(clippy::cast_possible_truncation, reason = "rounds towards 0 and saturates")]
 pub(crate) fn whole_part(v: f64) -> usize {
     v as usize

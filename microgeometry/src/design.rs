@@ -1,4 +1,4 @@
-//! Everything a microgeometry needs, in one file.
+//! Designs: all parameters of a microgeometry in one file.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,14 +7,14 @@ use crate::displacement::{Direction, Offset, Profile};
 use crate::error::MicrogeometryError;
 use crate::reconstruction::Method;
 
-/// A microgeometry that can be put on any mesh: `design.json`.
+/// A microgeometry that can be applied to any mesh: `design.json`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     /// The distribution to rebuild.
     pub contact: ContactDistribution,
     /// Half the mesh's longest box side, in distribution units (u; "scale units" of table 1).
     pub units: f64,
-    /// How labels are given.
+    /// Method of labelling.
     pub method: Method,
     /// Displacement of the negative region.
     pub negative: Offset,
@@ -72,7 +72,7 @@ fn tight() -> String {
 const SCHEMA: &str = "stereology.design/1";
 
 impl Design {
-    /// A design with the default method, seed 0, on a mesh as it is.
+    /// A design with the default method, seed 0 and no refinement of the mesh.
     #[must_use]
     pub fn new(contact: ContactDistribution, units: f64, negative: Offset, positive: Offset) -> Self {
         Self {
@@ -129,19 +129,16 @@ impl Design {
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError`] that names what is missing or cannot be.
+    /// [`MicrogeometryError`] that names what is missing or out of range.
     pub fn from_json(text: &str) -> Result<Self, MicrogeometryError> {
-        let written: Written = serde_json::from_str(text).map_err(|error| {
-            MicrogeometryError::File(format!(
-                "is no design ({error}); `stereology explore` and `stereology displace --design-out` write them"
-            ))
-        })?;
+        let written: Written =
+            serde_json::from_str(text).map_err(|error| MicrogeometryError::File(format!("not a design ({error})")))?;
         let offset = |of: &WrittenOffset| -> Result<Offset, MicrogeometryError> {
             let direction: Direction = of.direction.parse()?;
             let profile: Profile = of.profile.parse()?;
             if !(of.scale.is_finite() && of.scale >= 0.0) {
                 return Err(MicrogeometryError::Parameter(format!(
-                    "no scale of an offset: {}",
+                    "the scale of an offset must be zero or above, not {}",
                     of.scale
                 )));
             }
@@ -188,7 +185,9 @@ pub struct Preset {
     pub positive: Offset,
 }
 
-/// Table 1 of the paper: the parameters of its figures. Scale units and k are the paper's; the columns of directions and functions have lost their dashes in the text we have, so which region stays where it is is our reading.
+/// Table 1 of the paper: the parameters of its figures. Scale units and k are the paper's; the columns of directions
+/// and functions have lost their dashes in the available text of the paper, so which regions are not displaced is an
+/// interpretation.
 ///
 /// ```
 /// let coral = stereology_microgeometry::presets().into_iter().find(|preset| preset.name == "fig8-coral").unwrap();

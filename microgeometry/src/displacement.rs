@@ -1,4 +1,4 @@
-//! Labels turned into relief (section 4.5 of the paper).
+//! Displacement: from labels to relief (section 4.5 of the paper).
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,14 +9,14 @@ use stereology_shape::TriangleMesh;
 use crate::error::MicrogeometryError;
 use crate::reconstruction::longest_side;
 
-/// f(x): how the distance to the interface becomes height.
+/// f(x): the height as a function of the distance to the interface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// f(x) = x: straight flanks, sharp ridges and valleys.
     Linear,
     /// f(x) = √x: rounded.
     Root,
-    /// Straight between given points (x, f), the first at x ≥ 0 and x rising; constant beyond them.
+    /// Linear between given points (x, f), the first at x ≥ 0 and x increasing; constant beyond them.
     Table(Vec<[f64; 2]>),
 }
 
@@ -66,7 +66,7 @@ impl FromStr for Profile {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             MicrogeometryError::Parameter(format!(
-                "{text:?} is no profile: x, sqrt, or a table such as 0=0;1=0.5;3=2 (distance=height, distances rising from 0)"
+                "{text:?} is not a profile: x, sqrt, or a table such as 0=0;1=0.5;3=2 (distance=height, distances increasing from 0)"
             ))
         };
         match text.trim() {
@@ -137,7 +137,7 @@ impl FromStr for Direction {
             "-1" | "in" => Ok(Self::In),
             "0" | "none" => Ok(Self::Still),
             _ => Err(MicrogeometryError::Parameter(format!(
-                "{text:?} is no direction: out (or 1), in (or -1), none (or 0)"
+                "{text:?} is not a direction: out (or 1), in (or -1), none (or 0)"
             ))),
         }
     }
@@ -146,11 +146,11 @@ impl FromStr for Direction {
 /// s, k, f of one region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Offset {
-    /// s: which way.
+    /// s: the direction.
     pub direction: Direction,
-    /// k: how far, in halves of the mesh's longest box side; table 1 has 0.01 to 0.055.
+    /// k: the scale, in halves of the mesh's longest box side; table 1 has 0.01 to 0.055.
     pub scale: f64,
-    /// f: of what form.
+    /// f: the profile.
     pub profile: Profile,
 }
 
@@ -185,7 +185,7 @@ impl FromStr for Offset {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             MicrogeometryError::Parameter(format!(
-                "{text:?} is no offset S,K,F: direction (out, in, none), scale (zero or above), profile (x, sqrt, or a table), such as out,0.03,sqrt"
+                "{text:?} is not an offset S,K,F: direction (out, in, none), scale (zero or above), profile (x, sqrt, or a table), such as out,0.03,sqrt"
             ))
         };
         let parts: Vec<&str> = text.splitn(3, ',').collect();
@@ -204,23 +204,25 @@ impl FromStr for Offset {
     }
 }
 
-/// A mesh with relief.
+/// A displaced mesh.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Displaced {
-    /// The mesh, vertices moved; triangles as they were.
+    /// The mesh with moved vertices and the same triangles.
     pub mesh: TriangleMesh,
-    /// Signed distance to the interface of each vertex: the mean of the triangles about it, distribution units.
+    /// Signed distance to the interface of each vertex: the mean of the triangles around it, distribution units.
     pub values: Vec<f64>,
 }
 
-/// Moves every vertex along the normal by s k f(|x|) half box sides, x the mean label of the triangles about it, and s, k, f those of its region (section 4.5).
+/// Moves every vertex along the normal by s k f(|x|) half box sides, x the mean label of the triangles around it, and
+/// s, k, f those of its region (section 4.5).
 ///
-/// Normals are means of the triangles' own, weighted by the angles there; a vertex without one stays. `labels` are in distribution units, one a triangle; the mesh is in any unit. Cost: linear.
+/// Normals are means of the triangles' normals, weighted by their angles; a vertex without a normal does not move.
+/// `labels` are in distribution units, one per triangle; the mesh is in any unit. Cost: linear.
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError`] if there is not one label a triangle, or the mesh has no extent or is broken.
+/// [`MicrogeometryError`] if there is not one label per triangle, or the mesh has no extent or is invalid.
 ///
 /// # Examples
 ///
@@ -268,7 +270,7 @@ pub fn displace(
     })
 }
 
-/// Mean label of the triangles about each vertex; 0 without any.
+/// Mean label of the triangles around each vertex; 0 if there are none.
 #[must_use]
 pub fn vertex_values(mesh: &TriangleMesh, labels: &[f64]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0_u32); mesh.vertices.len()];

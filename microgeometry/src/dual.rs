@@ -1,4 +1,4 @@
-//! Distances over a mesh: the graph whose nodes are the triangles' centroids.
+//! Distances over a mesh: the dual graph, whose nodes are the triangles' centroids.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -14,7 +14,8 @@ pub enum Adjacency {
     /// Triangles that share a vertex: lengths of paths are 1.01 to 1.03 times those over the smooth surface.
     #[default]
     Vertices,
-    /// Triangles that share an edge, the paper's (section 4.2): paths zigzag and are 1.2 to 1.3 times too long, over slivers up to 4 times.
+    /// Triangles that share an edge, as in the paper (section 4.2): paths zigzag and are 1.2 to 1.3 times too long,
+    /// over slivers up to 4 times.
     Edges,
 }
 
@@ -24,18 +25,20 @@ pub enum Metric {
     /// By its Euclidean length, as in the paper.
     #[default]
     Isotropic,
-    /// By √(eᵀ M e) with a symmetric positive definite M: steps across what M stretches are longer, so structures are narrow there.
+    /// By √(eᵀ M e) with a symmetric positive definite M: steps along the directions that M stretches are longer, so
+    /// structures are narrower there.
     Tensor(Matrix3<f64>),
 }
 
 impl Metric {
     /// Structures `stretch` times as long along `axis` as across it, with the same area.
     ///
-    /// Lengths along the axis are divided by √stretch, lengths across it multiplied by it; so distances are squared lengths M = a aᵀ/stretch + (1 − a aᵀ) stretch.
+    /// Lengths along the axis are divided by √stretch, lengths across it multiplied by it; so distances are squared
+    /// lengths M = a aᵀ/stretch + (1 − a aᵀ) stretch.
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::Metric`] if the axis is no direction or the stretch no positive number.
+    /// [`MicrogeometryError::Metric`] if the axis is not a direction or the stretch not a positive number.
     ///
     /// ```
     /// use nalgebra::Vector3;
@@ -76,9 +79,11 @@ impl Metric {
     }
 }
 
-/// The dual of a mesh: a node a triangle, an edge between neighbours, as long as the step between their centroids.
+/// The dual of a mesh: one node per triangle, and edges between neighbours, as long as the step between their
+/// centroids.
 ///
-/// Distances over the surface are shortest paths in it (section 4.2 of the paper). |xₐ − x_b| ≤ w on every edge is the same as |xₐ − x_b| ≤ d(a, b) for all pairs: paths are sums of edges.
+/// Distances over the surface are shortest paths in it (section 4.2 of the paper). |xₐ − x_b| ≤ w on every edge is
+/// equivalent to |xₐ − x_b| ≤ d(a, b) for all pairs, because paths are sums of edges.
 ///
 /// # Examples
 ///
@@ -103,7 +108,8 @@ pub struct DualGraph {
     mean_length: f64,
 }
 
-/// A step to a neighbour. Its length is rounded down to single precision, so that graphs need half the memory and no label differs by more than the length in full; all that is summed from it is in double precision.
+/// A step to a neighbour. Its length is rounded down to single precision, so that graphs need half the memory and
+/// labels never differ by more than the exact length; sums are in double precision.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     length: f32,
@@ -116,7 +122,7 @@ impl Link {
     }
 }
 
-/// The nearest number of single precision that is not larger; lengths are finite and not negative.
+/// The largest number of single precision that does not exceed a finite length.
 pub(crate) fn rounded_down(length: f64) -> f32 {
     let near = single(length);
     if f64::from(near) > length {
@@ -130,15 +136,18 @@ pub(crate) fn rounded_down(length: f64) -> f32 {
 const MOST_LINKS: usize = 1 << 28;
 /// Coordinates are below this, so that squares of areas are numbers.
 const LARGEST: f64 = 1e60;
-/// Triangles a task.
+/// Triangles per task.
 const BLOCK: usize = 8192;
 
 impl DualGraph {
-    /// The dual of any triangles, open or not. Vertices at equal positions should have been welded. Cost: linear in triangles (times their number about a vertex).
+    /// The dual of any triangles, open or not. Vertices at equal positions should have been welded. Cost: linear in
+    /// triangles (times their number around a vertex).
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError`] if there are fewer than two triangles, an index is out of range, a vertex is not finite, all triangles are without area, the metric is not positive, or some vertex has so many triangles that the graph does not fit.
+    /// [`MicrogeometryError`] if there are fewer than two triangles, an index is out of range, a vertex is not finite,
+    /// no triangle has an area, the metric is not positive, or some vertex has so many triangles that the graph does
+    /// not fit.
     pub fn new(mesh: &TriangleMesh, adjacency: Adjacency, metric: Metric) -> Result<Self, MicrogeometryError> {
         check(mesh)?;
         metric.check()?;
@@ -231,13 +240,13 @@ impl DualGraph {
         self.areas.len()
     }
 
-    /// Never: a graph has two triangles at least.
+    /// Always false: a graph has at least two triangles.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.areas.is_empty()
     }
 
-    /// The triangles beside triangle `t` and how far their centroids are.
+    /// The neighbours of triangle `t` and the distances of their centroids.
     pub fn neighbours(&self, t: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.links(t).iter().map(|link| (link.to as usize, link.length()))
     }
@@ -248,7 +257,7 @@ impl DualGraph {
         &self.areas
     }
 
-    /// The connected pieces, each a list of triangles, in order of their lowest triangle.
+    /// The connected components, each a list of triangles, in order of their lowest triangle.
     #[must_use]
     pub fn pieces(&self) -> &[Vec<u32>] {
         &self.pieces
@@ -260,7 +269,8 @@ impl DualGraph {
         self.mean_length
     }
 
-    /// Distances over the graph from some triangles, each with a distance it starts with; infinite where no path leads. Cost: Dijkstra's, n log n.
+    /// Distances over the graph from some triangles, each with an initial distance; infinite where no path leads. Cost:
+    /// Dijkstra's, n log n.
     ///
     /// ```
     /// use stereology_microgeometry::{Adjacency, DualGraph, Metric};
@@ -311,7 +321,8 @@ impl DualGraph {
     }
 }
 
-/// Raises `bound` to max over the sources of (value − distance), everywhere: exact. Sources have their values already.
+/// Raises `bound` to max over the sources of (value − distance), everywhere: exact. Sources must have their values
+/// already.
 pub(crate) fn spread(graph: &DualGraph, bound: &mut [f64], sources: &[(u32, f64)]) {
     let mut front = Wavefront::new(0.5 * graph.mean_length());
     front.restart(sources.iter().fold(f64::NEG_INFINITY, |most, of| most.max(of.1)));
@@ -332,7 +343,7 @@ pub(crate) fn spread(graph: &DualGraph, bound: &mut [f64], sources: &[(u32, f64)
     }
 }
 
-/// The triangles about each vertex.
+/// The triangles around each vertex.
 struct Around {
     starts: Vec<usize>,
     triangles: Vec<u32>,
@@ -366,13 +377,13 @@ impl Around {
         self.starts.windows(2).map(|pair| pair[1] - pair[0])
     }
 
-    /// Fills `near` with the triangles beside `t`, in order.
+    /// Fills `near` with the neighbours of `t`, in order.
     fn neighbours(&self, corners: &[u32; 3], t: u32, adjacency: Adjacency, near: &mut Vec<u32>) {
         near.clear();
         near.extend(corners.iter().flat_map(|&v| self.of(v)).filter(|&&s| s != t));
         near.sort_unstable();
         if adjacency == Adjacency::Edges {
-            // Who shares an edge shares two vertices.
+            // Triangles that share an edge share two vertices.
             let mut last = u32::MAX;
             let mut kept = 0;
             for i in 0..near.len() {

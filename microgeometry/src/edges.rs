@@ -1,8 +1,8 @@
-//! How many triangles meet at each edge.
+//! Edges by the number of their triangles.
 
 use stereology_shape::TriangleMesh;
 
-/// Numbers of edges that are not those of a closed surface.
+/// Numbers of edges that a closed surface does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EdgeCensus {
     /// Edges of one triangle: the mesh is open there.

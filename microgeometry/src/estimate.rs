@@ -1,4 +1,4 @@
-//! Contact distributions measured on pictures and volumes (section 5.3 and figure 8 of the paper).
+//! Contact distributions measured on images and volumes (section 5.3 and figure 8 of the paper).
 
 use ndarray::{ArrayView2, ArrayView3, Axis};
 use stereology_imaging::distance_to_other_region;
@@ -10,13 +10,15 @@ use crate::error::MicrogeometryError;
 /// How distances are measured and counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Counting {
-    /// From the interface, which runs half way between pixels of different regions: a pixel whose nearest opposite one is d away spreads evenly over [d − 1, d]. What the border hides is estimated (Kaplan and Meier's product; Baddeley & Gill 1997): a distance longer than
-    /// that to the border is not known to be so long.
+    /// From the interface, which runs half way between pixels of different regions: a pixel whose nearest opposite one
+    /// is d away counts uniformly over [d − 1, d]. Distances longer than that to the border are censored, and the
+    /// distribution is estimated by the Kaplan-Meier product (Baddeley & Gill 1997).
     #[default]
     Interface,
-    /// As [`Counting::Interface`], with all distances taken as they are seen: for pictures of the whole structure.
+    /// As [`Counting::Interface`] without correction for the border: for images of the whole structure.
     InterfaceSeen,
-    /// The paper's: the distance d to the nearest pixel of the other region, in the bin of its whole part (so the first bin is empty), divided by all pixels; the border is ignored.
+    /// As in the paper: the distance d to the nearest pixel of the other region, in the bin of its whole part (so the
+    /// first bin is empty), divided by all pixels; the border is ignored.
     Paper,
 }
 
@@ -42,37 +44,38 @@ impl Default for EstimateOptions {
     }
 }
 
-/// The contact distribution of a picture with two regions, (row, column).
+/// The contact distribution of an image with two regions, (row, column).
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError::OneRegion`] if there is one region only; [`MicrogeometryError::Parameter`] for options that cannot be.
+/// [`MicrogeometryError::OneRegion`] if there is one region only; [`MicrogeometryError::Parameter`] for options out of
+/// range.
 ///
 /// # Examples
 ///
-/// Stripes 10 pixels wide: distances are even between 0 and 5.
+/// Stripes 10 pixels wide: distances are uniform between 0 and 5.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use stereology_microgeometry::{EstimateOptions, contact_of_picture};
+/// use stereology_microgeometry::{EstimateOptions, contact_of_image};
 ///
 /// let stripes = Array2::from_shape_fn((40, 200), |(_, x)| x / 10 % 2 == 0);
-/// let of = contact_of_picture(stripes.view(), &EstimateOptions::default())?;
+/// let of = contact_of_image(stripes.view(), &EstimateOptions::default())?;
 /// assert!(of.positive()[..5].iter().all(|share| (share - 0.1).abs() < 0.01));
 /// # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
 /// ```
-pub fn contact_of_picture(
+pub fn contact_of_image(
     positive: ArrayView2<'_, bool>,
     options: &EstimateOptions,
 ) -> Result<ContactDistribution, MicrogeometryError> {
-    estimate(positive.insert_axis(Axis(0)), options, "the picture")
+    estimate(positive.insert_axis(Axis(0)), options, "the image")
 }
 
 /// The contact distribution of a volume with two regions, (z, y, x): pores and material of figure 8.
 ///
 /// # Errors
 ///
-/// As [`contact_of_picture`].
+/// As [`contact_of_image`].
 ///
 /// ```
 /// use ndarray::Array3;
@@ -106,7 +109,7 @@ fn estimate(
     } = *options;
     if !(pixel_size.is_finite() && pixel_size > 0.0) {
         return Err(MicrogeometryError::Parameter(format!(
-            "the size of a pixel is a positive finite length, not {pixel_size}"
+            "the size of a pixel must be a positive finite length, not {pixel_size}"
         )));
     }
     if bins.is_some_and(|bins| bins == 0 || bins > MOST_BINS) {
@@ -119,7 +122,7 @@ fn estimate(
     if !largest.is_finite() || distances.is_empty() {
         return Err(MicrogeometryError::OneRegion(what));
     }
-    // In pixels until the end.
+    // In pixels until the last line.
     let width = bins.map_or(1.0, |bins| largest * (1.0 + 1e-12) / bins as f64);
     let shape = [0, 1, 2].map(|axis| positive.len_of(Axis(axis)));
     let mut lives = [LifeTable::new(width, largest), LifeTable::new(width, largest)];
@@ -139,18 +142,18 @@ fn estimate(
     ContactDistribution::new(width * pixel_size, negative, positive)
 }
 
-/// From a pixel's centre to the border of the picture, in pixels.
+/// Distance of a pixel's centre from the border of the image, in pixels.
 fn border_distance((z, y, x): (usize, usize, usize), shape: [usize; 3]) -> f64 {
     [z, y, x]
         .into_iter()
         .zip(shape)
-        // A picture is one layer thick and has no border there.
+        // An image is one layer thick and has no border along that axis.
         .filter(|&(_, n)| n > 1)
         .map(|(i, n)| i.min(n - 1 - i) as f64 + 0.5)
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Distances of one region that were seen, and those known only to be longer, by bins.
+/// Observed and censored distances of one region, by bins.
 struct LifeTable {
     width: f64,
     seen: Vec<f64>,
@@ -171,7 +174,7 @@ impl LifeTable {
         whole_part(distance / self.width).min(self.seen.len() - 1)
     }
 
-    /// A distance somewhere in an interval.
+    /// Adds a distance somewhere in an interval.
     fn see(&mut self, [low, high]: [f64; 2]) {
         let (first, last) = (self.bin(low), self.bin(high));
         if first == last {
@@ -184,13 +187,14 @@ impl LifeTable {
         }
     }
 
-    /// A distance longer than this.
+    /// Adds a distance known only to be longer than this.
     fn lose(&mut self, distance: f64) {
         let bin = self.bin(distance);
         self.lost[bin] += 1.0;
     }
 
-    /// Shares of the bins times the number of points: Π (1 − seen / at risk), those lost in a bin being at risk for half of it.
+    /// Fractions of the bins times the number of points, by Π (1 − observed / at risk), where those censored in a bin
+    /// are at risk for half of it.
     fn shares(self) -> Vec<f64> {
         let total: f64 = self.seen.iter().chain(&self.lost).sum();
         let (mut at_risk, mut surviving) = (total, total);
@@ -202,7 +206,7 @@ impl LifeTable {
             surviving *= 1.0 - hazard;
             at_risk -= seen + lost;
         }
-        // Nobody saw how far the last ones are: at least as far as the farthest that was seen.
+        // The remaining distances are all censored: they count as the longest observed one.
         if let Some(last) = shares.iter().rposition(|share| *share > 0.0) {
             shares[last] += surviving.max(0.0);
         }
@@ -212,10 +216,10 @@ impl LifeTable {
 
 #[cfg(test)]
 mod tests {
-    use super::{Counting, EstimateOptions, contact_of_picture};
+    use super::{Counting, EstimateOptions, contact_of_image};
     use ndarray::Array2;
 
-    /// A disc's points lie nearer to its rim than r in the share 1 − (1 − r/R)².
+    /// A disc's points lie nearer to its rim than r with probability 1 − (1 − r/R)².
     #[test]
     fn discs_have_the_closed_form() {
         let disc = Array2::from_shape_fn((101, 101), |(y, x)| (y as f64 - 50.0).hypot(x as f64 - 50.0) < 40.0);
@@ -223,17 +227,17 @@ mod tests {
             counting: Counting::InterfaceSeen,
             ..EstimateOptions::default()
         };
-        let of = contact_of_picture(disc.view(), &options).unwrap();
+        let of = contact_of_image(disc.view(), &options).unwrap();
         for (k, share) in of.positive_contact().iter().enumerate().take(39) {
             let expected = 1.0 - (1.0 - (k as f64 + 1.0) / 40.0_f64).powi(2);
             assert!((share - expected).abs() < 0.012, "{k}: {share} {expected}");
         }
     }
 
-    /// A window that hides most of a stripe: what is seen is too near, the estimate is not.
+    /// A window that shows little of each stripe: observed distances are too short, the estimate is not.
     #[test]
     fn the_border_is_corrected() {
-        // Stripes of 30 pixels cut by a window 100 wide: the true shares are even over 15 bins.
+        // Stripes of 30 pixels cut by a window 100 wide: the true fractions are uniform over 15 bins.
         let mut seen = (0.0, 0.0);
         for shift in 0..60 {
             let stripes = Array2::from_shape_fn((100, 100), |(_, x)| (x + shift) / 30 % 2 == 0);
@@ -242,7 +246,7 @@ mod tests {
                     counting,
                     ..EstimateOptions::default()
                 };
-                let of = contact_of_picture(stripes.view(), &options).unwrap();
+                let of = contact_of_image(stripes.view(), &options).unwrap();
                 1.0 - of.positive_contact().get(9).unwrap()
             };
             seen.0 += far(Counting::Interface) / 60.0;
@@ -260,7 +264,7 @@ mod tests {
             counting: Counting::Paper,
             ..EstimateOptions::default()
         };
-        let of = contact_of_picture(half.view(), &options).unwrap();
+        let of = contact_of_image(half.view(), &options).unwrap();
         for (k, share) in of.positive().iter().enumerate() {
             let expected = if k == 0 { 0.0 } else { 1.0 / 6.0 };
             assert!((share - expected).abs() < 1e-12);

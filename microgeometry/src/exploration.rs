@@ -1,4 +1,4 @@
-//! Random points of the parameter space (section 5.1 of the paper): designs to look at.
+//! Random designs from the parameter space (section 5.1 of the paper).
 
 use std::f64::consts::PI;
 
@@ -11,21 +11,23 @@ use crate::displacement::{Direction, Offset, Profile};
 use crate::error::MicrogeometryError;
 use crate::families::Law;
 
-/// Pairs of laws drawn until one has a share of the positive region in its range.
+/// Most pairs of laws drawn to find one whose fraction of the positive region is in its range.
 const TRIES: usize = 64;
 
-/// Where designs are drawn from. What is `Some` is the same in all.
+/// The ranges from which designs are drawn. What is `Some` is the same in all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exploration {
-    /// The contact distribution; `None`: drawn too, a blend of two laws in each region. They are such that surfaces can have them: a density of distances begins with the length of the interface, which is the same for both regions, and cannot rise away from it in both.
+    /// The contact distribution; `None`: drawn too, a blend of two laws in each region. Only laws that a surface can
+    /// have are drawn: at the interface both regions have the same density of distances, given by its length, and it
+    /// cannot increase away from the interface in both.
     pub contact: Option<ContactDistribution>,
-    /// Scale units, drawn evenly in their logarithm; table 1 has 27 to 82.
+    /// Scale units, log-uniform; table 1 has 27 to 82.
     pub units: [f64; 2],
-    /// Typical distances of the laws, in bins, drawn evenly in their logarithm.
+    /// Typical distances of the laws, in bins, log-uniform.
     pub lengths: [f64; 2],
-    /// Share of the positive region.
+    /// Fraction of the positive region.
     pub shares: [f64; 2],
-    /// k, drawn evenly in its logarithm, for the profile √x; a third of it for x, which rises higher.
+    /// k, log-uniform, for the profile √x; a third of it for x, which rises higher.
     pub scales: [f64; 2],
     /// Displacement of the negative region.
     pub negative: Option<Offset>,
@@ -34,7 +36,7 @@ pub struct Exploration {
 }
 
 impl Default for Exploration {
-    /// Units 25 to 85, distances 0.7 to 6 bins, shares 0.15 to 0.85, k 0.008 to 0.05.
+    /// Units 25 to 85, distances 0.7 to 6 bins, fractions 0.15 to 0.85, k 0.008 to 0.05.
     fn default() -> Self {
         Self {
             contact: None,
@@ -53,7 +55,8 @@ impl Exploration {
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::Parameter`] naming a range that is not two positive finite numbers in order, or shares outside 0..1.
+    /// [`MicrogeometryError::Parameter`] naming a range that is not two positive finite numbers in order, or fractions
+    /// outside 0..1.
     pub fn check(&self) -> Result<(), MicrogeometryError> {
         for (name, [low, high]) in [
             ("units", self.units),
@@ -64,14 +67,14 @@ impl Exploration {
             let most = if name == "shares" { 1.0 } else { 1e6 };
             if !(low > 0.0 && low <= high && high <= most) {
                 return Err(MicrogeometryError::Parameter(format!(
-                    "the range of {name} is two numbers above zero, the lower first, at most {most}: not {low},{high}"
+                    "the range of {name} must be two numbers above zero, the lower first, at most {most}: not {low},{high}"
                 )));
             }
         }
         Ok(())
     }
 
-    /// The design of this number; the same for the same seed, whatever else is drawn.
+    /// The design of this number; the same for the same seed, whatever other designs are drawn.
     ///
     /// # Errors
     ///
@@ -108,15 +111,16 @@ impl Exploration {
         Ok(design)
     }
 
-    /// A design near another (a tighter search, section 5.1): units, scales and every bin multiplied by factors exp(±`spread`), directions and profiles as they are.
+    /// A design near another (a tighter search, section 5.1): units, scales and every bin multiplied by factors
+    /// exp(±`spread`), directions and profiles as they are.
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::Parameter`] if the spread is no positive number.
+    /// [`MicrogeometryError::Parameter`] if the spread is not a positive number.
     pub fn near(&self, of: &Design, spread: f64, seed: u64, number: u64) -> Result<Design, MicrogeometryError> {
         if !(spread.is_finite() && spread > 0.0 && spread <= 3.0) {
             return Err(MicrogeometryError::Parameter(format!(
-                "the spread of a nearby search is above 0 and at most 3, not {spread}"
+                "the spread of a nearby search must be above 0 and at most 3, not {spread}"
             )));
         }
         let mut random = stream(seed, number);
@@ -149,7 +153,8 @@ impl Exploration {
         first.blended(&second, random.random())
     }
 
-    /// Laws of both regions that a surface can have: next to the interface lies as much of the one as of the other, which says what share each has.
+    /// Laws of both regions that a surface can have: at the interface both have the same density, which determines the
+    /// fraction of each.
     fn pair(&self, random: &mut ChaCha8Rng) -> Result<ContactDistribution, MicrogeometryError> {
         let [low, high] = self.shares;
         let (mut best, mut off) = ((Law::Uniform(1.0), Law::Uniform(1.0), 0.5), f64::INFINITY);
@@ -170,14 +175,14 @@ impl Exploration {
         ContactDistribution::from_laws(1.0, negative, positive, share)
     }
 
-    /// A law whose density falls from the interface on.
+    /// A law whose density decreases away from the interface.
     fn law(&self, random: &mut ChaCha8Rng) -> Law {
         let length = log_even(random, self.lengths);
         match random.random_range(0..4) {
             0 => Law::Uniform(2.0 * length),
             1 => Law::Disc(3.0 * length),
             2 => Law::Exponential(length),
-            // Between discs so dense that the density does not rise: 2 π λ R² = 1.5.
+            // Between discs so dense that the density of distances does not increase: 2 π λ R² = 1.5.
             _ => {
                 let radius = 1.5 * length;
                 let intensity = 0.75 / (PI * radius * radius);
@@ -202,7 +207,7 @@ impl Exploration {
         };
         Offset {
             direction,
-            // Three digits say all there is to say, and read well.
+            // Five decimals are precise enough and easy to read.
             scale: (scale * 1e5).round() / 1e5,
             profile,
         }

@@ -1,4 +1,4 @@
-//! Contact distributions from formulas.
+//! Contact distributions in closed form.
 
 use std::f64::consts::PI;
 use std::str::FromStr;
@@ -6,25 +6,27 @@ use std::str::FromStr;
 use crate::contact::{ContactDistribution, MOST_BINS};
 use crate::error::MicrogeometryError;
 
-/// The law of the distances in one region, by its cumulated probability F(r).
+/// The law of the distances in one region, by its cumulative distribution F(r).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
-    /// Even up to a distance: stripes of twice that width. F = r/R.
+    /// Uniform up to a distance: stripes of twice that width. F = r/R.
     Uniform(f64),
     /// Inside discs of a radius. F = 1 − (1 − r/R)².
     Disc(f64),
     /// F = 1 − exp(−r/s).
     Exponential(f64),
-    /// F = 1 − exp(−r²/2s²): between points thrown at random, λ = 1/(2π s²).
+    /// F = 1 − exp(−r²/2s²): between the points of a Poisson process of intensity λ = 1/(2π s²).
     Rayleigh(f64),
-    /// Between discs of a radius thrown at random, so many a unit of area (Boolean model). F = 1 − exp(−π λ (2Rr + r²)).
+    /// Between discs of a radius placed at random, with an intensity per unit of area (Boolean model). F = 1 − exp(−π λ
+    /// (2Rr + r²)).
     Boolean {
         /// Radius R.
         radius: f64,
         /// Intensity λ.
         intensity: f64,
     },
-    /// Bell-shaped about a distance: most points at that distance from the interface. F of a logistic law (close to a normal one) cut off at 0.
+    /// Bell-shaped about a distance: most points at that distance from the interface. F of a logistic law (close to a
+    /// normal one) truncated at 0.
     Bell {
         /// Mean.
         mean: f64,
@@ -74,7 +76,7 @@ impl FromStr for Law {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             MicrogeometryError::Parameter(format!(
-                "{text:?} is no law; they are uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION"
+                "{text:?} is not a law; laws are uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION"
             ))
         };
         let (name, values) = text.split_once(':').ok_or_else(wrong)?;
@@ -97,11 +99,13 @@ impl FromStr for Law {
 }
 
 impl ContactDistribution {
-    /// From the laws of both regions and the share of the positive one; cut off where less than 10⁻⁶ of a region lies beyond.
+    /// From the laws of both regions and the fraction of the positive one; truncated where less than 10⁻⁶ of a region
+    /// lies beyond.
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError`] if the share is not in 0..1, a law's parameters cannot be, or bins are too narrow for it.
+    /// [`MicrogeometryError`] if the fraction is not in 0..1, a law's parameters are out of range, or bins are too
+    /// narrow for it.
     ///
     /// ```
     /// use stereology_microgeometry::{ContactDistribution, Law};
@@ -114,12 +118,14 @@ impl ContactDistribution {
     pub fn from_laws(bin_width: f64, negative: Law, positive: Law, share: f64) -> Result<Self, MicrogeometryError> {
         if !(0.0..=1.0).contains(&share) {
             return Err(MicrogeometryError::Parameter(format!(
-                "the share of the positive region is between 0 and 1, not {share}"
+                "the fraction of the positive region must be between 0 and 1, not {share}"
             )));
         }
         let of = |law: Law, share: f64| -> Result<Vec<f64>, MicrogeometryError> {
             if !law.is_valid() {
-                return Err(MicrogeometryError::Parameter(format!("{law:?} is no law of distances")));
+                return Err(MicrogeometryError::Parameter(format!(
+                    "{law:?} is not a law of distances"
+                )));
             }
             let mut shares = Vec::new();
             let mut before = 0.0;

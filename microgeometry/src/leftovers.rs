@@ -1,13 +1,15 @@
-//! Triangles that the histogram has no label for get one that breaks no bound.
+//! Labels within the bounds for the triangles for which the histogram has none left.
 
 use crate::conversions::index;
 use crate::dual::{DualGraph, spread};
 
-/// What the labelled triangles allow all others: x is at least max(xₐ − d) and at most min(xₐ + d), two searches from all of them at once.
+/// Bounds that the labelled triangles impose on all others: x is at least max(xₐ − d) and at most min(xₐ + d), by two
+/// searches from all of them at once.
 ///
-/// Any mixture (1 − m) low + m high with one m obeys the bounds between the others too, because both are functions that change by no more than the distance; so does max(low, min(high, f)) of any such function f.
+/// Any mixture (1 − m) low + m high with one m obeys the bounds between the others too, because neither function
+/// changes by more than the distance; so does max(low, min(high, f)) of any such function f.
 pub(crate) fn bounds(graph: &DualGraph, labelled: &[bool], labels: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    // Labels do not bind each other any more: only those beside triangles without one are sources.
+    // Only labels beside unlabelled triangles can bound them.
     let beside: Vec<usize> = (0..graph.len())
         .filter(|&t| labelled[t] && graph.links(t).iter().any(|link| !labelled[link.to as usize]))
         .collect();
@@ -24,10 +26,11 @@ pub(crate) fn bounds(graph: &DualGraph, labelled: &[bool], labels: &[f64]) -> (V
     (from(1.0), upper)
 }
 
-/// Rounds in which leftovers take the mean of their neighbours.
+/// Iterations in which leftovers take the mean of their neighbours.
 const ROUNDS: usize = 8;
 
-/// The paper's leftovers (section 4.4): the average of the neighbours, as far as the bounds allow. They start half way between their bounds; then each moves to its neighbours' mean within what these allow now, which breaks no bound.
+/// Leftovers as in the paper (section 4.4): the average of the neighbours, as far as the bounds allow. They start half
+/// way between their bounds; then each moves to its neighbours' mean within its current bounds.
 pub(crate) fn average(graph: &DualGraph, labelled: &[bool], labels: &mut [f64]) {
     if !labelled.contains(&true) {
         labels.fill(0.0);
@@ -36,7 +39,7 @@ pub(crate) fn average(graph: &DualGraph, labelled: &[bool], labels: &mut [f64]) 
     let (low, high) = bounds(graph, labelled, labels);
     let open: Vec<usize> = (0..graph.len()).filter(|&t| !labelled[t]).collect();
     for &t in &open {
-        // Pieces without any label have no bounds.
+        // Components without any label have no bounds.
         labels[t] = if low[t].is_finite() {
             0.5 * (low[t] + high[t])
         } else {
@@ -53,7 +56,7 @@ pub(crate) fn average(graph: &DualGraph, labelled: &[bool], labels: &mut [f64]) 
                 count += 1;
             }
             if count > 0 {
-                // Rounding may leave nothing between the bounds; then the value stays.
+                // Rounding may leave no interval between the bounds; then the value stays.
                 let mean = sum / f64::from(count);
                 if low <= high {
                     labels[t] = mean.clamp(low, high);

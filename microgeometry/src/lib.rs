@@ -1,30 +1,35 @@
-//! Relief on any mesh with the structure of a picture: stochastic microgeometry (Schroeder et al. 2005).
+//! Stochastic microgeometry (Schroeder et al. 2005): relief on any mesh with the structure of an image.
 //!
-//! A picture of two regions (pores and grains, light and dark) is summed up by how far its points lie from the interface between them: its *contact distribution*. Such a distribution is rebuilt on a mesh by giving every triangle a signed distance x so that
+//! An image of two regions (pores and grains, light and dark) is summarised by its *contact distribution*: how far its
+//! points lie from the interface between the regions. Such a distribution is reproduced on a mesh by assigning every
+//! triangle a signed distance x so that
 //!
 //! ```text
-//! shares of the surface with x in [k b, (k+1) b)  =  shares of the picture          (the histogram, section 4.3)
-//! |xₐ − x_b| ≤ d(a, b)   for all triangles        (no distance changes faster than the way over the surface, section 4.4)
+//! fractions of the surface with x in [k b, (k+1) b)  =  fractions of the image      (the histogram, section 4.3)
+//! |xₐ − x_b| ≤ d(a, b)   for all triangles        (no label changes faster than the distance over the surface, section 4.4)
 //! offset of a vertex = s k f(|x|) along its normal (section 4.5)
 //! ```
 //!
-//! with d the length of paths over the dual of the mesh. Labels are given from the largest distances inwards. Whoever lies so near a label that it must have one of this bin gets it; then random triangles that may. The random choice is what makes every seed another instance of one material.
-//! Then the interface between the regions is moved until distances measured to it are distributed as asked, and labels are given once more, within these distances.
+//! with d the length of shortest paths over the dual of the mesh. Labels are assigned from the largest distances
+//! inwards. Triangles forced into a bin by a labelled neighbour are labelled first, then random triangles that may have
+//! a label of the bin. The random choice makes every seed another instance of the same material. Then the interface
+//! between the regions is moved until distances to it have the required distribution, and labels are assigned again
+//! within these distances.
 //!
 //! # Examples
 //!
-//! From a picture to a relief:
+//! From an image to a relief:
 //!
 //! ```
 //! use ndarray::Array2;
-//! use stereology_microgeometry::{EstimateOptions, Offset, ReconstructOptions, contact_of_picture, displace, reconstruct, to_distribution_units};
+//! use stereology_microgeometry::{EstimateOptions, Offset, ReconstructOptions, contact_of_image, displace, reconstruct, to_distribution_units};
 //! use stereology_shape::TriangleMesh;
 //!
 //! let dots = Array2::from_shape_fn((120, 120), |(y, x)| {
 //!     let (u, v) = ((y % 24) as f64 - 11.5, (x % 24) as f64 - 11.5);
 //!     u.hypot(v) < 8.0
 //! });
-//! let contact = contact_of_picture(dots.view(), &EstimateOptions::default())?;
+//! let contact = contact_of_image(dots.view(), &EstimateOptions::default())?;
 //! let ball = TriangleMesh::icosphere(2.0, 4);
 //! let labels = reconstruct(&to_distribution_units(&ball, 30.0)?, &contact, &ReconstructOptions::default(), &|_| std::ops::ControlFlow::Continue(()))?;
 //! assert_eq!(labels.violations, 0);
@@ -33,7 +38,8 @@
 //! # Ok::<(), stereology_microgeometry::MicrogeometryError>(())
 //! ```
 //!
-//! A spherical cap's geodesic distances to its rim are known: nearer to the pole than θ lies the share (1 − cos θ)/2 of a sphere.
+//! A spherical cap's geodesic distances to its rim are known: the fraction (1 − cos θ)/2 of a sphere is nearer to the
+//! pole than θ.
 //!
 //! ```
 //! use stereology_microgeometry::{Adjacency, DualGraph, Metric, interface_distances};
@@ -51,8 +57,10 @@
 //!
 //! # What was rejected
 //!
-//! Labels one triangle after the other with their bounds spread each time (20 times slower on fine meshes than many seeds at once). Asking for shorter distances until those measured fit: it diverges. The dual over edges as the default (its paths are 1.2 to 1.3 times too long). Seeds without looking ahead, as in the paper: 7 to 30 % of the triangles are left over, against none.
-//! The meshopt crate for simplification (it compiles C++).
+//! Labelling one triangle after the other and propagating its bounds each time (20 times slower on fine meshes than
+//! many seeds at once). Requiring shorter distances until the measured ones fit: it diverges. The dual over edges as
+//! the default (its paths are 1.2 to 1.3 times too long). Seeds without looking ahead, as in the paper: 7 to 30 % of
+//! the triangles are left over, instead of none. The meshopt crate for simplification (it compiles C++).
 
 mod bounds;
 mod budget;
@@ -85,7 +93,7 @@ pub use displacement::{Direction, Displaced, Offset, Profile, displace, vertex_n
 pub use dual::{Adjacency, DualGraph, Metric};
 pub use edges::EdgeCensus;
 pub use error::MicrogeometryError;
-pub use estimate::{Counting, EstimateOptions, contact_of_picture, contact_of_volume};
+pub use estimate::{Counting, EstimateOptions, contact_of_image, contact_of_volume};
 pub use exploration::Exploration;
 pub use families::Law;
 pub use measure::{distribution_of, interface_distances, violations};

@@ -1,20 +1,21 @@
-//! How well labels keep their bounds and the distribution they were made from.
+//! Measures of labels: violated bounds, distances to the interface, distribution.
 
 use crate::contact::ContactDistribution;
 use crate::dual::DualGraph;
 use crate::error::MicrogeometryError;
 
-/// Rounding of distances, as a share of the largest label.
+/// Rounding of distances, as a fraction of the largest label.
 const ROUNDING: f64 = 1e-9;
 
-/// Edges of the graph on which labels differ by more than their length: |xₐ − x_b| > w. None means that all pairs of triangles keep their distance, because paths are sums of edges.
+/// Edges of the graph on which labels differ by more than their length: |xₐ − x_b| > w. Zero means that the labels of
+/// any two triangles differ by at most their distance, because paths are sums of edges.
 ///
 /// # Panics
 ///
-/// If there is not one label a triangle.
+/// If there is not one label per triangle.
 #[must_use]
 pub fn violations(graph: &DualGraph, labels: &[f64]) -> usize {
-    assert_eq!(labels.len(), graph.len(), "one label a triangle");
+    assert_eq!(labels.len(), graph.len(), "one label per triangle");
     let allowed = ROUNDING * labels.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let beyond = |a: usize| {
         graph
@@ -25,7 +26,8 @@ pub fn violations(graph: &DualGraph, labels: &[f64]) -> usize {
     (0..graph.len()).map(beyond).sum()
 }
 
-/// Distances of all triangles to the interface, measured over the graph: from the middles of the edges between triangles of different sign, with the sign of the triangle's label. Infinite if there is one sign only.
+/// Distances of all triangles to the interface, measured over the graph: from the midpoints of the edges between
+/// triangles of different sign, with the sign of the triangle's label. Infinite if there is one sign only.
 #[must_use]
 pub fn interface_distances(graph: &DualGraph, labels: &[f64]) -> Vec<f64> {
     let mut near = Vec::new();
@@ -49,7 +51,7 @@ pub fn interface_distances(graph: &DualGraph, labels: &[f64]) -> Vec<f64> {
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError::TooManyBins`] if a label is too far or not finite.
+/// [`MicrogeometryError::TooManyBins`] if a label is too large or not finite.
 pub fn distribution_of(
     labels: &[f64],
     weights: &[f64],

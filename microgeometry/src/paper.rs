@@ -1,4 +1,4 @@
-//! Reconstruction to the letter of section 4.4 of the paper.
+//! Reconstruction exactly as in section 4.4 of the paper.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -24,12 +24,14 @@ pub(crate) struct Paper<'a> {
 }
 
 impl Paper<'_> {
-    /// From the bins farthest from the interface inwards, both regions in turn: first the triangles whose range forces them into the bin, most extreme first, while it holds labels; then random triangles whose range holds the bin's inner edge.
+    /// From the bins farthest from the interface inwards, both regions in turn: first the triangles whose range forces
+    /// them into the bin, most extreme first, while it holds labels; then random triangles whose range holds the bin's
+    /// inner edge.
     pub(crate) fn run(&self, mut room: [Levels; 2]) -> Result<Labelling, MicrogeometryError> {
         let count = self.graph.len();
         let levels = room[0].len().max(room[1].len());
         room.iter_mut().for_each(|side| side.resize(levels, 0));
-        // Nothing looks ahead: any level may be forced full.
+        // No looking ahead: any weight may be forced into a level.
         let endless = vec![i64::MAX / 2; levels];
         let limit = Limit {
             room: &endless,
@@ -67,7 +69,7 @@ impl Paper<'_> {
                     .unwrap_or(0)
                     .min(eligible.len());
                 let (seeds, _) = eligible.partial_shuffle(&mut random, wanted);
-                // Labels of one bin and sign do not bind each other, so they are given at once.
+                // Labels of one bin and sign do not bound each other, so they are assigned at once.
                 let _ = regions[side].spread(seeds, value, -value - self.bin, &mut labelled, &limit);
                 for &t in seeds.iter() {
                     labels[t as usize] = signed(side, value);

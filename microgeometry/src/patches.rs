@@ -1,4 +1,4 @@
-//! A graph of patches in place of triangles: where regions lie can be found on it before the mesh is asked.
+//! A graph of patches of triangles, on which the position of the regions is found before the mesh itself is labelled.
 
 use crate::conversions::index;
 use crate::dual::{DualGraph, rounded_down};
@@ -17,10 +17,11 @@ pub(crate) struct Patches {
 }
 
 impl Patches {
-    /// Patches about centres that lie at least `radius` apart, every triangle with the nearest centre. Lengths are those of paths over the mesh from centre to centre, about a tenth too long.
+    /// Patches about centres that lie at least `radius` apart, every triangle with the nearest centre. Lengths are
+    /// those of paths over the mesh from centre to centre, about a tenth too long.
     pub(crate) fn new(fine: &DualGraph, radius: f64) -> Self {
         let count = fine.len();
-        // Centres: whatever is not within the radius of an earlier one.
+        // Centres: triangles not within the radius of an earlier centre.
         let mut reached = vec![f64::INFINITY; count];
         let mut centres: Vec<u32> = Vec::new();
         let mut front = Wavefront::new(0.5 * fine.mean_length());
@@ -88,7 +89,7 @@ impl Patches {
         }
     }
 
-    /// What the patches weigh.
+    /// Weights of the patches.
     pub(crate) fn weights(&self, of: &[i64]) -> Vec<i64> {
         let mut sums = vec![0; self.centres.len()];
         for (&patch, weight) in self.patch.iter().zip(of) {
@@ -97,7 +98,8 @@ impl Patches {
         sums
     }
 
-    /// Signed distances of the patches' centres carried to all triangles: half way between the least and the most that they allow.
+    /// Signed distances of the patches' centres carried over to all triangles: half way between the bounds that they
+    /// impose.
     pub(crate) fn carried(&self, fine: &DualGraph, values: &[f64]) -> Vec<f64> {
         let mut known = vec![false; fine.len()];
         let mut labels = vec![0.0; fine.len()];
@@ -116,7 +118,7 @@ mod tests {
     use crate::dual::{Adjacency, DualGraph, Metric};
     use stereology_shape::TriangleMesh;
 
-    /// Patches cover the surface once, and ways from patch to patch are hardly longer than from triangle to triangle.
+    /// Patches cover the surface once, and paths from patch to patch are hardly longer than from triangle to triangle.
     #[test]
     fn patches_keep_areas_and_distances() {
         let fine = DualGraph::new(&TriangleMesh::icosphere(2.0, 5), Adjacency::Vertices, Metric::Isotropic).unwrap();

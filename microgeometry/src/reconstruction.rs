@@ -14,16 +14,20 @@ use crate::measure::{distribution_of, interface_distances, violations};
 use crate::paper::Paper;
 use crate::patches::Patches;
 use crate::relaxation::{Moves, relaxed};
-use crate::tight::{Shore, Tight};
+use crate::tight::{GivenInterface, Tight};
 use stereology_metrics::Progress;
 
-/// How labels are given to triangles.
+/// Method of labelling the triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Looks ahead (a seed that would force more triangles into a bin than it holds is refused) and moves the interface between the regions until distances to it are distributed as asked, so that labels are the true distances. Triangles that share a vertex are neighbours; triangles count by area.
+    /// Looks ahead (a seed that would force more triangles into a bin than it has room for is refused) and moves the
+    /// interface between the regions until distances to it have the required distribution, so that labels are true
+    /// distances. Triangles that share a vertex are neighbours; triangles count by area.
     #[default]
     Tight,
-    /// Section 4.4 of the paper to the letter: triangles that share an edge are neighbours, every triangle counts one, leftovers take the average of their neighbours. 5 to 12 % are left over where triangles are as large as bins, half of all on fine meshes.
+    /// Exactly section 4.4 of the paper: triangles that share an edge are neighbours, every triangle counts one,
+    /// leftovers take the average of their neighbours. 5 to 12 % are left over where triangles are as large as bins,
+    /// half of them on fine meshes.
     Paper,
 }
 
@@ -46,29 +50,29 @@ impl FromStr for Method {
             "tight" => Ok(Self::Tight),
             "paper" => Ok(Self::Paper),
             _ => Err(MicrogeometryError::Parameter(format!(
-                "{text:?} is no method: tight or paper"
+                "{text:?} is not a method: tight or paper"
             ))),
         }
     }
 }
 
-/// What a triangle counts for in the histogram.
+/// Weight of a triangle in the histogram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weighting {
     /// Its area: the distribution is that of a random point of the surface, however uneven the mesh.
     Area,
-    /// One, as in the paper: that of a random triangle.
+    /// One, as in the paper: the distribution is that of a random triangle.
     Count,
 }
 
-/// How a reconstruction is made.
+/// Options of a reconstruction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReconstructOptions {
-    /// How labels are given.
+    /// Method of labelling.
     pub method: Method,
-    /// Which triangles are neighbours; `None`: as the method has it.
+    /// Which triangles are neighbours; `None`: the method's default.
     pub adjacency: Option<Adjacency>,
-    /// What triangles count for; `None`: as the method has it.
+    /// Weights of triangles; `None`: the method's default.
     pub weighting: Option<Weighting>,
     /// How steps are measured.
     pub metric: Metric,
@@ -95,7 +99,7 @@ impl ReconstructOptions {
         Self { metric, ..self }
     }
 
-    /// With triangles counting like this.
+    /// With these weights of triangles.
     #[must_use]
     pub const fn with_weighting(self, weighting: Weighting) -> Self {
         Self {
@@ -114,25 +118,28 @@ impl ReconstructOptions {
     }
 }
 
-/// Labels, and how they turned out.
+/// Labels, and their accuracy.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Reconstruction {
     /// Signed distance of each triangle to the interface, distribution units.
     pub labels: Vec<f64>,
-    /// Share of the triangles for which the histogram had no label left: they lie between their bounds.
+    /// Fraction of the triangles for which the histogram had no label left: their labels are between their bounds.
     pub left_over: f64,
-    /// Share of all labels that lie in another bin than the histogram asked for: leftovers, and labels that found no place in their bin and moved towards the interface. Far above zero, the mesh cannot hold the distribution ([`Reconstruction::shortfalls`]).
+    /// Fraction of all labels in another bin than the histogram requires: leftovers, and labels for which there was no
+    /// triangle in their bin and which moved towards the interface. If it is far above zero, the mesh cannot have the
+    /// distribution ([`Reconstruction::shortfalls`]).
     pub misplaced: f64,
     /// Edges of the dual on which labels differ by more than their length; always 0 for a reconstruction.
     pub violations: usize,
     /// Earth mover's distance of the labels to the distribution, bins.
     pub emd_labels: f64,
-    /// That of the distances to the interface, measured again from the labels' signs. `None` if one region is missing.
+    /// Earth mover's distance of the distances to the interface, measured again from the labels' signs. `None` if one
+    /// region is missing.
     pub emd_measured: Option<f64>,
-    /// Bins that did not get their share, farthest from the interface first: what the mesh cannot hold.
+    /// Bins with less than their required fraction, farthest from the interface first.
     pub shortfalls: Vec<Shortfall>,
-    /// Connected pieces of the mesh, each of which got its share.
+    /// Number of connected components of the mesh, each of which got its fraction of the distribution.
     pub pieces: usize,
 }
 
@@ -141,22 +148,26 @@ pub struct Reconstruction {
 pub struct Shortfall {
     /// 0, 1, ... in the positive region, −1, −2, ... in the negative one.
     pub bin: i64,
-    /// Share of the surface it should have.
+    /// Required fraction of the surface.
     pub wanted: f64,
-    /// Share it has.
+    /// Fraction reached.
     pub got: f64,
 }
 
-/// Shortfalls smaller than this share of the surface are not told.
-const TOLD: f64 = 1e-4;
+/// Shortfalls smaller than this fraction of the surface are not reported.
+const REPORTED: f64 = 1e-4;
 
-/// Labels the triangles of a mesh with signed distances whose distribution is `of`, so that no two labels differ by more than the distance between the triangles (section 4.4 of the paper).
+/// Labels the triangles of a mesh with signed distances whose distribution is `of`, so that no two labels differ by
+/// more than the distance between the triangles (section 4.4 of the paper).
 ///
-/// The mesh is in distribution units: see [`to_distribution_units`]. Any triangles will do: open meshes, edges with more than two triangles, several pieces (each gets its share). Equal positions should have been welded. Cost: about n log n.
+/// The mesh is in distribution units: see [`to_distribution_units`]. It may be open, have edges with more than two
+/// triangles and several components (each gets its fraction of the distribution). Vertices at equal positions should
+/// have been welded. Cost: about n log n.
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError`] if the mesh has fewer than two triangles or none with area, is broken, the metric is none, or `progress` broke off.
+/// [`MicrogeometryError`] if the mesh has fewer than two triangles or none with area, is invalid, the metric is not
+/// positive definite, or `progress` cancelled.
 ///
 /// # Examples
 ///
@@ -209,18 +220,20 @@ pub fn reconstruct(
     describe(&graph, of, &weights, made)
 }
 
-/// Triangles smaller than this share of a square bin, on average, are taken together in patches to begin with.
+/// Triangles smaller than this fraction of a square bin, on average, are first combined into patches.
 const FINE: f64 = 0.7;
-/// Bins from the centre of a patch to those about it, at least.
+/// Least distance between the centres of patches, bins.
 const PATCH: f64 = 0.8;
-/// Below this share of a square bin, labels need not be longer than the distance to the interface.
+/// Below this fraction of a square bin, labels need not be longer than the distance to the interface.
 const EXACT: f64 = 0.25;
-/// Times the interface is moved where it is found, and again on the triangles of a mesh of patches.
+/// Iterations of moving the interface: when it is found, and again on the triangles after patches.
 const SWEEPS: [usize; 2] = [12, 2];
-/// Chance in motions where the interface is found. Without it random fields on triangles as large as bins are measured .3 bins off, with it .2; from .5 to 1 it is the same.
+/// Random variation of the motions when the interface is found. For random fields on triangles as large as bins the
+/// error of measured distances is .3 bins without it and .2 with it; from .5 to 1 there is no difference.
 const NOISE: f64 = 0.75;
 
-/// Labels from the farthest inwards, on patches of the mesh if it is fine; the interface between them moved until distances to it fit; then labels for that interface.
+/// Labels from the farthest inwards, on patches of the mesh if it is fine; then the interface between the regions is
+/// moved until distances to it fit; then labels for that interface.
 fn tight(
     graph: &DualGraph,
     of: &ContactDistribution,
@@ -231,7 +244,7 @@ fn tight(
 ) -> Result<Labelling, MicrogeometryError> {
     let bin = of.bin_width();
     let total = weights.iter().sum();
-    let label = |graph: &DualGraph, weights: &[i64], shore: Option<Shore<'_>>, [from, to]: [f64; 2]| {
+    let label = |graph: &DualGraph, weights: &[i64], interface: Option<GivenInterface<'_>>, [from, to]: [f64; 2]| {
         Tight {
             graph,
             weights,
@@ -239,7 +252,7 @@ fn tight(
             bin,
             tolerance: if weighting == Weighting::Area { UNIT / 8 } else { 0 },
             seed,
-            shore,
+            interface,
             progress: &|done| progress(from + (to - from) * done),
         }
         .run(levels(of, PARTS, total))
@@ -263,12 +276,12 @@ fn tight(
         relaxed(graph, weights, of, &first.labels, moves(0))
     };
     progress_to(progress, 0.5)?;
-    let shore = Shore {
+    let interface = GivenInterface {
         distance: &distance,
-        // Pieces without interface are labelled freely, which takes bounds across.
+        // Components without interface are labelled freely, which needs the bounds of both regions.
         across: area >= EXACT || distance.iter().any(|x| x.is_infinite()),
     };
-    label(graph, weights, Some(shore), [0.5, 1.0])
+    label(graph, weights, Some(interface), [0.5, 1.0])
 }
 
 fn progress_to(progress: Progress<'_>, done: f64) -> Result<(), MicrogeometryError> {
@@ -278,7 +291,9 @@ fn progress_to(progress: Progress<'_>, done: f64) -> Result<(), MicrogeometryErr
     }
 }
 
-/// Levels a bin is cut into: labels follow the slope of the distribution within bins. 1 leaves measured distances .3 bins off where 2 leaves .25; 4 suit coarse random fields better (.16) and thin structures less (.9 for .6).
+/// Levels per bin: labels follow the slope of the distribution within bins. The error of measured distances is .3 bins
+/// with 1 level and .25 with 2; 4 are better for coarse random fields (.16) and worse for thin structures (.9 instead
+/// of .6).
 const PARTS: usize = 2;
 
 fn describe(
@@ -292,7 +307,7 @@ fn describe(
     let got = distribution_of(&labels, &weights, of.bin_width())?;
     let both = labels.iter().any(|x| x.is_sign_negative()) && labels.iter().any(|x| !x.is_sign_negative());
     let measured = interface_distances(graph, &labels);
-    // A piece of one region only has no interface.
+    // A component of one region only has no interface.
     let reached = measured.iter().zip(&weights).filter(|(d, _)| d.is_finite());
     let emd_measured = if both {
         let measured = ContactDistribution::from_distances(of.bin_width(), reached.map(|(d, w)| (*d, *w)))?;
@@ -307,7 +322,7 @@ fn describe(
             let at = |of: &[f64]| of.get(k).copied().unwrap_or_default();
             let (wanted, got) = (at(wanted), at(got));
             misplaced += (wanted - got).max(0.0);
-            if wanted - got > TOLD {
+            if wanted - got > REPORTED {
                 let bin = if sign > 0 { k as i64 } else { -(k as i64) - 1 };
                 shortfalls.push(Shortfall { bin, wanted, got });
             }
@@ -329,7 +344,8 @@ fn describe(
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError::Parameter`] if `units` is no positive number, [`MicrogeometryError::NoArea`] if all vertices are one point.
+/// [`MicrogeometryError::Parameter`] if `units` is not a positive number, [`MicrogeometryError::NoArea`] if all
+/// vertices are one point.
 ///
 /// ```
 /// # use stereology_microgeometry::to_distribution_units;
@@ -341,7 +357,7 @@ fn describe(
 pub fn to_distribution_units(mesh: &TriangleMesh, units: f64) -> Result<TriangleMesh, MicrogeometryError> {
     if !(units.is_finite() && units > 0.0) {
         return Err(MicrogeometryError::Parameter(format!(
-            "scale units are a positive finite number, not {units}: half the longest box side in distribution units"
+            "scale units must be a positive finite number, not {units}: half the longest box side in distribution units"
         )));
     }
     let side = longest_side(mesh)?;

@@ -1,4 +1,5 @@
-//! Meshes made fine enough to carry the relief (section 4.4: split triangles until the mesh is fine enough).
+//! Refinement of meshes until they are fine enough for the relief (section 4.4: split triangles until the mesh is fine
+//! enough).
 
 use std::f64::consts::TAU;
 
@@ -8,17 +9,19 @@ use stereology_shape::{Subdivision, TriangleMesh};
 use crate::conversions::index;
 use crate::error::MicrogeometryError;
 
-/// More triangles than this are refused.
+/// Most triangles of a refined mesh.
 pub const MOST_TRIANGLES: usize = 50_000_000;
 
 /// The mesh with no edge longer than `edge_length`.
 ///
-/// [`Subdivision::Midpoint`] splits the edges that are too long at their middles, and only those: the surface stays as it was, and uneven meshes become even. [`Subdivision::Loop`] first rounds the whole mesh by Loop's scheme (borders by their own rule) until edges are so long on average, then splits those still too long. Open meshes and edges with any number of triangles are allowed.
-/// Cost: linear in the triangles that result.
+/// [`Subdivision::Midpoint`] splits the edges that are too long at their middles, and only those: the surface does not
+/// change, and uneven meshes become even. [`Subdivision::Loop`] first smooths the whole mesh by Loop's scheme (borders
+/// by their own rule) until the mean edge is short enough, then splits the edges that are still too long. Open meshes
+/// and edges with any number of triangles are allowed. Cost: linear in the triangles that result.
 ///
 /// # Errors
 ///
-/// [`MicrogeometryError::Parameter`] if the length is no positive number or would make more than [`MOST_TRIANGLES`].
+/// [`MicrogeometryError::Parameter`] if the length is not a positive number or would make more than [`MOST_TRIANGLES`].
 ///
 /// # Examples
 ///
@@ -39,7 +42,7 @@ pub const MOST_TRIANGLES: usize = 50_000_000;
 pub fn refined(mesh: &TriangleMesh, scheme: Subdivision, edge_length: f64) -> Result<TriangleMesh, MicrogeometryError> {
     if !(edge_length.is_finite() && edge_length > 0.0) {
         return Err(MicrogeometryError::Parameter(format!(
-            "the length of edges is a positive finite number, not {edge_length}"
+            "the length of edges must be a positive finite number, not {edge_length}"
         )));
     }
     let mut mesh = mesh.clone();
@@ -70,7 +73,7 @@ pub fn refined(mesh: &TriangleMesh, scheme: Subdivision, edge_length: f64) -> Re
 fn check_count(triangles: usize, edge_length: f64) -> Result<(), MicrogeometryError> {
     if triangles > MOST_TRIANGLES {
         return Err(MicrogeometryError::Parameter(format!(
-            "edges of {edge_length} would make more than {MOST_TRIANGLES} triangles: ask for longer edges"
+            "edges of {edge_length} would make more than {MOST_TRIANGLES} triangles: give a larger length"
         )));
     }
     Ok(())
@@ -177,7 +180,7 @@ fn split(mesh: &TriangleMesh, edges: &Edges, chosen: &[bool], smooth: bool) -> T
     TriangleMesh { vertices, triangles }
 }
 
-/// A triangle a b c with middles on a b and b c: the corner at b, and the shorter diagonal of the rest.
+/// A triangle a b c with midpoints on a b and b c: the corner at b, and the rest divided by its shorter diagonal.
 fn two_split(vertices: &[Point3<f64>], triangles: &mut Vec<[u32; 3]>, [a, ab, b, bc, c]: [u32; 5]) {
     let length = |i: u32, j: u32| (vertices[i as usize] - vertices[j as usize]).norm_squared();
     triangles.push([ab, b, bc]);
@@ -188,7 +191,7 @@ fn two_split(vertices: &[Point3<f64>], triangles: &mut Vec<[u32; 3]>, [a, ab, b,
     }
 }
 
-/// Vertices drawn towards their neighbours by Loop's weight, on borders along the border alone.
+/// Vertices moved towards their neighbours by Loop's weight; on borders along the border only.
 fn smoothed(mesh: &TriangleMesh, edges: &Edges, opposite: &[([u32; 2], u32)]) -> Vec<Point3<f64>> {
     let zero = (Vector3::zeros(), 0_u32);
     let (mut inner, mut border) = (vec![zero; mesh.vertices.len()], vec![zero; mesh.vertices.len()]);
@@ -206,7 +209,7 @@ fn smoothed(mesh: &TriangleMesh, edges: &Edges, opposite: &[([u32; 2], u32)]) ->
             let weight = 0.625 - (0.375 + 0.25 * (TAU / n).cos()).powi(2);
             Point3::from(p.coords * (1.0 - weight) + sum * (weight / f64::from(count)))
         }
-        // Where several borders meet, and what no triangle uses.
+        // Vertices where several borders meet, and those that no triangle uses.
         _ => *p,
     };
     mesh.vertices.iter().enumerate().map(place).collect()

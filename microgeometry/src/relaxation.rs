@@ -1,13 +1,18 @@
-//! Moves the interface between the regions until distances to it, measured over the surface, are distributed as asked.
+//! Moves the interface between the regions until distances to it, measured over the surface, have the required
+//! distribution.
 //!
-//! Labels given from the farthest inwards never exceed the distance to the interface, but they may fall short of it: where bodies meet, and where small labels end up side by side. Distances measured again then are longer than the labels say. Here the interface itself is moved.
+//! Labels assigned from the farthest inwards never exceed the distance to the interface, but they may be shorter: where
+//! regions around different seeds meet, and where small labels end up side by side. Distances measured again are then
+//! longer than the labels. Here the interface itself is moved.
 //!
 //! ```text
-//! y(x) = G⁻¹(F(x))               what the distance x should be: F the measured signed distances, G the distribution asked for
+//! y(x) = G⁻¹(F(x))               what the distance x should be: F the measured signed distances, G the required distribution
 //! v(p) = mean of x − y(x)        over the points whose nearest point of the interface is p: how far it is to move towards the positive region
 //! ```
 //!
-//! A motion by v changes all distances with foot p by −v, so this is the steepest descent of Σ (x − y)² (the square of Wasserstein's distance), with steps of the size that would do if all these points agreed. Where the middle of a region lies much too far from the interface, an island of the other region is put there.
+//! A motion by v changes all distances with foot p by −v, so this is steepest descent of Σ (x − y)² (the squared
+//! Wasserstein-2 distance), with steps that would suffice if all these points agreed. Where the middle of a region is
+//! much too far from the interface, an island of the other region is placed there.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +29,7 @@ struct Feet {
     distance: Vec<f64>,
     foot: Vec<u32>,
     /// The triangles beside the interface.
-    shore: Vec<u32>,
+    interface: Vec<u32>,
 }
 
 impl Feet {
@@ -32,7 +37,7 @@ impl Feet {
         let mut made = Self {
             distance: vec![f64::INFINITY; graph.len()],
             foot: vec![NONE; graph.len()],
-            shore: Vec::new(),
+            interface: Vec::new(),
         };
         let mut front = Wavefront::new(0.5 * graph.mean_length());
         front.restart(0.0);
@@ -43,7 +48,7 @@ impl Feet {
                 .filter(|link| positive[link.to as usize] != positive[t]);
             let near = other.map(|link| 0.5 * link.length()).fold(f64::INFINITY, f64::min);
             if near.is_finite() {
-                made.shore.push(index(t));
+                made.interface.push(index(t));
                 made.distance[t] = near;
                 made.foot[t] = index(t);
                 front.push(-near, index(t));
@@ -72,11 +77,11 @@ impl Feet {
     }
 }
 
-/// Cells a bin in which quantiles are counted, and most cells of all.
+/// Cells per bin in which quantiles are counted, and most cells in total.
 const CELLS: f64 = 16.0;
 const MOST_CELLS: f64 = 1e6;
 
-/// The map of signed distances to those they should be.
+/// The map from signed distances to the required ones.
 struct Quantiles {
     per_unit: f64,
     first: f64,
@@ -102,7 +107,7 @@ impl Quantiles {
             shares[whole_part(x * per_unit - first)] += weight as f64;
             total += weight as f64;
         }
-        // The distribution asked for, from its lowest bin to its highest.
+        // The required distribution, from its lowest bin to its highest.
         let bins: Vec<f64> = of.negative().iter().rev().chain(of.positive()).copied().collect();
         let lowest = -(of.negative().len() as f64);
         let (mut bin, mut under) = (0, 0.0);
@@ -150,21 +155,23 @@ impl Quantiles {
 /// How an interface is moved.
 #[derive(Clone, Copy)]
 pub(crate) struct Moves {
-    /// How often.
+    /// Number of iterations.
     pub(crate) sweeps: usize,
-    /// Chance in the place where a triangle changes sides, in mean steps of the graph: motions shorter than a triangle take place on some of them.
+    /// Random variation of the place where a triangle changes sides, in mean steps of the graph, so that motions
+    /// shorter than a triangle take place on some triangles.
     pub(crate) noise: f64,
     pub(crate) seed: u64,
 }
 
-/// Motions are this many times those that would do if all points of a foot agreed.
+/// Factor of the motions over those that would suffice if all points of a foot agreed.
 const STRIDE: f64 = 1.5;
-/// Distances are aimed at a fifth longer than asked, up to a fifth of a bin: labels can be shorter than distances, not longer.
+/// Distances are aimed a fifth longer than required, at most a fifth of a bin, because labels can be shorter than
+/// distances, not longer.
 const LIFT: f64 = 0.2;
-/// How much worse distances are that are too short.
+/// Weight of distances that are too short.
 const TOO_NEAR: f64 = 3.0;
 
-/// Signed distances to the best interface met when the one that `labels` begin with is moved; infinite without one.
+/// Signed distances to the best interface found by moving that of `labels`; infinite if there is none.
 pub(crate) fn relaxed(
     graph: &DualGraph,
     weights: &[i64],
@@ -175,13 +182,13 @@ pub(crate) fn relaxed(
     let bin = of.bin_width();
     let noise = moves.noise * graph.mean_length();
     let mut random = ChaCha8Rng::seed_from_u64(moves.seed);
-    // Not the numbers that seeds are chosen by.
+    // A stream of its own, independent of the choice of seeds.
     random.set_stream(1);
     let mut positive: Vec<bool> = labels.iter().map(|x| x.is_sign_positive()).collect();
     let mut best = (f64::INFINITY, vec![f64::INFINITY; graph.len()]);
     for sweep in 0..=moves.sweeps {
         let feet = Feet::of(graph, &positive);
-        if feet.shore.is_empty() {
+        if feet.interface.is_empty() {
             break;
         }
         let wanted = Quantiles::new(&feet.distance, weights, of);
@@ -202,7 +209,7 @@ pub(crate) fn relaxed(
     best.1
 }
 
-/// How far the interface is to move at each triangle beside it, towards the positive region.
+/// By how much the interface must move at each triangle beside it, towards the positive region.
 fn speeds(graph: &DualGraph, weights: &[i64], feet: &Feet, wanted: &Quantiles, bin: f64) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); graph.len()];
     for (t, &foot) in feet.foot.iter().enumerate() {
@@ -216,8 +223,8 @@ fn speeds(graph: &DualGraph, weights: &[i64], feet: &Feet, wanted: &Quantiles, b
         }
     }
     let mut speed = vec![0.0; graph.len()];
-    for &t in &feet.shore {
-        // With the triangles beside it on both shores, which move as one.
+    for &t in &feet.interface {
+        // With the adjacent triangles on both sides of the interface, which move together.
         let (mut sum, mut of) = sums[t as usize];
         for link in graph.links(t as usize) {
             sum += sums[link.to as usize].0;
@@ -228,7 +235,7 @@ fn speeds(graph: &DualGraph, weights: &[i64], feet: &Feet, wanted: &Quantiles, b
     speed
 }
 
-/// Islands of the other region where the middle of a region lies too far from its shore.
+/// Islands of the other region where the middle of a region lies too far from the interface.
 fn islands(graph: &DualGraph, feet: &Feet, wanted: &Quantiles, bin: f64, positive: &mut [bool]) {
     let deep = |t: usize| {
         let x = feet.distance[t];

@@ -1,4 +1,5 @@
-//! Fewer triangles where the relief is flat (section 4.4: adaptively reduce the resolution of the final mesh).
+//! Simplification: fewer triangles where the relief is flat (section 4.4: adaptively reduce the resolution of the final
+//! mesh).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,12 +9,12 @@ use stereology_shape::TriangleMesh;
 
 use crate::conversions::index;
 
-/// Borders are kept as if planes of so many times their weight stood on them.
+/// Weight of the planes perpendicular to borders, which keep borders in place.
 const BORDER: f64 = 100.0;
 /// A triangle may not turn by more than about 78°.
 const TURN: f64 = 0.2;
 
-/// A simpler mesh, and what its vertices carry.
+/// A simplified mesh, and the values of its vertices.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Simplified {
@@ -23,13 +24,15 @@ pub struct Simplified {
     pub values: Vec<f64>,
 }
 
-/// The mesh with at most `most` triangles, edges collapsed where that changes the surface least (quadric error, Garland & Heckbert 1997): triangles stay small where the relief is rich. Values at vertices go along, interpolated.
+/// The mesh with at most `most` triangles, edges collapsed where that changes the surface least (quadric error, Garland
+/// & Heckbert 1997): triangles stay small where the relief is detailed. Values at vertices are interpolated.
 ///
-/// The topology stays: no edge is collapsed that would pinch the surface or turn a triangle over; so there may stay more triangles than asked for. Cost: n log n.
+/// The topology is preserved: no edge is collapsed that would pinch the surface or flip a triangle, so there may remain
+/// more triangles than requested. Cost: n log n.
 ///
 /// # Panics
 ///
-/// If there is not one value a vertex, or an index is out of range.
+/// If there is not one value per vertex, or an index is out of range.
 ///
 /// # Examples
 ///
@@ -110,7 +113,7 @@ struct Collapse {
 
 impl Collapse {
     fn new(mesh: &TriangleMesh, values: &[f64]) -> Self {
-        // About the middle, where products of coordinates lose least.
+        // Relative to the middle, where products of coordinates lose the least precision.
         let (low, high) = mesh.bounding_box().unwrap_or_default();
         let origin = nalgebra::center(&low, &high).coords;
         let points: Vec<Point3<f64>> = mesh.vertices.iter().map(|p| p - origin).collect();
@@ -171,14 +174,14 @@ impl Collapse {
         self.queue.push(Reverse((rank(cost), a, b, stamps)));
     }
 
-    /// Where the two vertices meet best, and what it costs.
+    /// The best position for the merged vertex, and its cost.
     fn best(&self, a: u32, b: u32) -> (Point3<f64>, f64) {
         let mut sum = self.quadrics[a as usize];
         sum.add(&self.quadrics[b as usize]);
         let [p, q] = [a, b].map(|v| self.points[v as usize]);
         let middle = nalgebra::center(&p, &q);
         let mut places = vec![p, q, middle];
-        // A point of least error that is far away is a plane's: the middle is as good.
+        // A point of least error far away means that the surface is flat here: the midpoint is as good.
         let trace = sum.a.trace();
         let firm = sum.a.determinant() > 1e-9 * (trace / 3.0).powi(3);
         if let Some(least) = sum
@@ -210,7 +213,7 @@ impl Collapse {
         near
     }
 
-    /// Puts b into a; returns how many triangles went, 0 if it must not be.
+    /// Merges b into a; returns how many triangles were removed, 0 if merging is not allowed.
     fn collapse(&mut self, a: u32, b: u32) -> usize {
         let (near_a, near_b) = (self.neighbours(a), self.neighbours(b));
         let shared = self.around[a as usize]
@@ -221,7 +224,7 @@ impl Collapse {
         if common != shared || shared == 0 || shared > 2 {
             return 0;
         }
-        // An edge between two borders is no border: closing it would pinch the surface.
+        // An inner edge between two border vertices: collapsing it would pinch the surface.
         if shared == 2 && self.on_border(a, &near_a) && self.on_border(b, &near_b) {
             return 0;
         }
@@ -268,7 +271,7 @@ impl Collapse {
         live != near.len()
     }
 
-    /// Would a triangle of `v` without `other` turn over if v went to `place`?
+    /// Whether a triangle of `v` without `other` would flip if v moved to `place`.
     fn turns(&self, v: u32, other: u32, place: &Point3<f64>) -> bool {
         self.around[v as usize].iter().any(|&t| {
             let Some(corners) = self.triangles[t as usize].filter(|c| !c.contains(&other)) else {
@@ -315,7 +318,7 @@ impl Collapse {
     }
 }
 
-/// Whole numbers in the order of the floats.
+/// Integers that sort as the floats do.
 fn rank(x: f64) -> u64 {
     let bits = x.to_bits();
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }

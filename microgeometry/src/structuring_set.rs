@@ -1,4 +1,4 @@
-//! Contact distributions of eq. (1) with other sets than discs.
+//! Contact distributions of eq. (1) with structuring sets other than discs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,14 +7,14 @@ use ndarray::ArrayView2;
 use crate::conversions::whole_part;
 use crate::error::MicrogeometryError;
 
-/// The set B that grows until it touches, about the origin (section 3.2).
+/// The structuring set B about the origin, which grows until it touches the other region (section 3.2).
 #[derive(Clone, Debug, PartialEq)]
 pub enum StructuringSet {
     /// The unit disc: radial contact, the distance.
     Disc,
     /// The square of half side 1: the larger of the two coordinate distances.
     Square,
-    /// Star-shaped: its radius in equally spaced directions, counter-clockwise from +x, straight between them.
+    /// Star-shaped: its radius in equally spaced directions, counter-clockwise from +x, linear between them.
     Star(Vec<f64>),
 }
 
@@ -23,7 +23,7 @@ impl StructuringSet {
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::Parameter`] for fewer than 3 radii or one that is no positive number.
+    /// [`MicrogeometryError::Parameter`] for fewer than 3 radii or one that is not a positive number.
     pub fn star(radii: Vec<f64>) -> Result<Self, MicrogeometryError> {
         if radii.len() < 3 || !radii.iter().all(|r| r.is_finite() && *r > 0.0) {
             return Err(MicrogeometryError::Parameter(
@@ -77,7 +77,8 @@ impl StructuringSet {
         }
     }
 
-    /// Eq. (1) for points thrown at random, `intensity` a unit of area: the probability that rB holds at least one, 1 − exp(−λ |rB|).
+    /// Eq. (1) for a Poisson process of points, `intensity` per unit of area: the probability that rB contains at least
+    /// one, 1 − exp(−λ |rB|).
     ///
     /// ```
     /// use stereology_microgeometry::StructuringSet;
@@ -89,11 +90,13 @@ impl StructuringSet {
         -(-intensity * self.area() * r * r).exp_m1()
     }
 
-    /// The contact distribution of the false pixels of a picture: for r = 1 … `radii` pixels the share of them whose rB holds a true one; B is cut off at the border of the picture. Only pixels that stay farther from the border than `radii` times B reaches are asked (minus sampling). Cost: pixels times |B| `radii`².
+    /// The contact distribution of the false pixels of an image: for r = 1 … `radii` pixels, the fraction of them whose
+    /// rB contains a true one. Only pixels whose rB stays inside the image for all radii are used (minus-sampling).
+    /// Cost: pixels times |B| `radii`².
     ///
     /// # Errors
     ///
-    /// [`MicrogeometryError::Parameter`] if no pixel is that far from the border, or all asked are true.
+    /// [`MicrogeometryError::Parameter`] if no pixel is that far from the border, or all of those are true.
     pub fn contact(&self, picture: ArrayView2<'_, bool>, radii: usize) -> Result<Vec<f64>, MicrogeometryError> {
         let reach = match self {
             Self::Disc | Self::Square => 1.0,
@@ -123,7 +126,7 @@ impl StructuringSet {
         }
         if asked == 0 {
             return Err(MicrogeometryError::Parameter(format!(
-                "no pixel outside the set is farther than {margin} pixels from the border: ask for fewer radii"
+                "no pixel outside the set is farther than {margin} pixels from the border: give fewer radii"
             )));
         }
         let mut sum = 0;
@@ -156,7 +159,8 @@ mod tests {
         }
     }
 
-    /// Points at random: 1 − exp(−λ|rB|) for disc, square and star, within six standard deviations (false alarms: 1e-6).
+    /// A Poisson process: 1 − exp(−λ|rB|) for disc, square and star, within six standard deviations (false alarms:
+    /// 1e-6).
     #[test]
     fn points_at_random_follow_equation_1() {
         let (n, share) = (400, 0.004);
@@ -166,7 +170,7 @@ mod tests {
         for set in [StructuringSet::Disc, StructuringSet::Square, star] {
             let measured = set.contact(picture.view(), 12).unwrap();
             for (k, h) in measured.iter().enumerate() {
-                // On the lattice |rB| is the number of its pixels, the asked one left out.
+                // On the lattice |rB| is the number of its pixels without the central one.
                 let r = k as f64 + 1.0;
                 let inside = |dy: i32, dx: i32| set.gauge(f64::from(dx), f64::from(dy)) <= r + 1e-9;
                 let pixels = (-13..=13)
@@ -174,7 +178,7 @@ mod tests {
                     .filter(|&(dy, dx)| inside(dy, dx))
                     .count();
                 let expected = 1.0 - (1.0 - share).powf(pixels as f64 - 1.0);
-                // Neighbouring pixels see the same points: about one independent answer for each |2rB|.
+                // Neighbouring pixels share points: about one independent observation per |2rB|.
                 let answers = (n * n) as f64 / (4.0 * pixels as f64);
                 let spread = (expected * (1.0 - expected) / answers).sqrt();
                 assert!(

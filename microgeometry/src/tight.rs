@@ -1,4 +1,4 @@
-//! Reconstruction that looks ahead and packs tightly: the default.
+//! The default method of reconstruction: it looks ahead, so that labels fill their bins.
 
 use std::ops::ControlFlow;
 
@@ -17,12 +17,15 @@ use stereology_metrics::Progress;
 
 /// Refusals in a row after which no seed farther from its region is tried.
 const REFUSALS: u32 = 32;
-/// How often the candidates are put in order again.
+/// How often the candidates are sorted again.
 const ROUNDS: u32 = 2;
 
-/// Seeds are tried in order of slack + APART × distance to the own region + CHANCE × a random share of a bin, both distances up to REACH bins.
+/// Seeds are tried in order of slack + APART × distance to the own region + CHANCE × a random fraction of a bin, both
+/// distances up to REACH bins.
 ///
-/// Of random fields on four meshes, APART 0 leaves the distances measured afterwards .26 to .5 bins off, .4 .2 to .35; a reach of 6 bins makes one large clump (1 to 6 bins off). CHANCE between .1 and 1 does not matter to them. Once the interface has been moved, nor does APART.
+/// For random fields on four meshes, the error of the distances measured afterwards is .26 to .5 bins with APART 0 and
+/// .2 to .35 with .4; a reach of 6 bins makes one large clump (1 to 6 bins). CHANCE makes no difference between .1 and
+/// 1, nor does APART once the interface has been moved.
 const APART: f64 = 0.4;
 const CHANCE: f64 = 0.3;
 const REACH: f64 = 2.0;
@@ -36,33 +39,36 @@ pub(crate) struct Tight<'a> {
     pub(crate) tolerance: i64,
     pub(crate) seed: u64,
     /// The interface, if it is given.
-    pub(crate) shore: Option<Shore<'a>>,
+    pub(crate) interface: Option<GivenInterface<'a>>,
     pub(crate) progress: Progress<'a>,
 }
 
-/// A given interface: labels get the signs of these distances to it.
+/// A given interface: labels take the signs of these distances to it.
 #[derive(Clone, Copy)]
-pub(crate) struct Shore<'a> {
+pub(crate) struct GivenInterface<'a> {
     /// Signed.
     pub(crate) distance: &'a [f64],
-    /// May labels be as long as the way to the nearest triangle of the other region, half an edge longer than the distance? Where triangles are as large as bins that is needed to fill the bins; where they are small it costs time.
+    /// Whether labels may be as long as the path to the nearest triangle of the other region, half an edge longer than
+    /// the distance. Where triangles are as large as bins this is needed to fill the bins; where they are small it only
+    /// costs time.
     pub(crate) across: bool,
 }
 
-/// Steps that may be spent on seeds that are refused, for each triangle without a label and level: tenths, without and with a given interface. Ten times as many change the earth mover's distances by less than .01.
+/// Steps that may be spent on refused seeds per unlabelled triangle and level: tenths, without and with a given
+/// interface. Ten times as many change the earth mover's distances by less than .01.
 const PATIENCE: [u64; 2] = [10, 1];
 
 /// How candidates are tried.
 struct Pass {
-    /// Weight that is tried at once, to begin with.
+    /// Weight that is tried at once at first.
     batch: i64,
     /// Refusals in a row after which no more are tried.
     refusals: u32,
-    /// May levels below use room that this one hands down?
+    /// Whether levels below may use room left in this one.
     hand_down: bool,
 }
 
-/// The two regions, negative and positive, and what has a label.
+/// The two regions, negative and positive, and the labels so far.
 struct State<'a> {
     regions: [Region<'a>; 2],
     labelled: Vec<bool>,
@@ -80,10 +86,10 @@ impl Tight<'_> {
             labelled: vec![false; count],
             label: vec![0.0; count],
         };
-        if let Some(Shore { distance, across }) = self.shore {
+        if let Some(GivenInterface { distance, across }) = self.interface {
             let ways = across.then(|| to_the_other_region(self.graph, distance));
             let longest = ways.as_deref().unwrap_or(distance);
-            // A piece without interface is labelled freely.
+            // A component without interface is labelled freely.
             for (t, x) in distance.iter().enumerate().filter(|(_, x)| x.is_finite()) {
                 let own = usize::from(!x.is_sign_negative());
                 state.regions[own].bound[t] = 0.0;
@@ -111,7 +117,7 @@ impl Tight<'_> {
         })
     }
 
-    /// Labels a piece down to the level next to the interface; returns what room the regions have left.
+    /// Labels a component down to the level next to the interface; returns the remaining room of the regions.
     fn piece(
         &self,
         state: &mut State<'_>,
@@ -131,7 +137,7 @@ impl Tight<'_> {
                 if level > 0 && room[side][level] > 0 {
                     self.seed(state, side, level, room, &open, dice);
                 }
-                // What found no place goes one level nearer to the interface.
+                // Labels that were not placed move one level nearer to the interface.
                 if level > 0 && room[side][level] > 0 {
                     room[side][level - 1] += std::mem::take(&mut room[side][level]);
                 }
@@ -141,7 +147,7 @@ impl Tight<'_> {
         Ok([0, 1].map(|side| room[side].iter().sum()))
     }
 
-    /// Triangles whose bound lies in the level get it as their label. They bind nobody who is not bound already.
+    /// Triangles whose bound lies in the level get it as their label. That imposes no new bounds on others.
     fn force(&self, state: &mut State<'_>, side: usize, level: usize, room: &mut [Levels; 2]) {
         for t in state.regions[side].forced_into(level, &state.labelled) {
             let region = &mut state.regions[side];
@@ -154,8 +160,9 @@ impl Tight<'_> {
         }
     }
 
-    /// Gives the level's remaining labels, those at its inner edge, to triangles that may have them: first where the other region is just as far away as the label says; when such seeds are refused too often, where
-    /// the region's own labels are near, which binds few others.
+    /// Assigns the level's remaining labels, at its inner edge, to triangles that may have them: first where the other
+    /// region is just as far away as the label; when such seeds are refused too often, near the region's own labels,
+    /// where few other triangles are newly bounded.
     fn seed(
         &self,
         state: &mut State<'_>,
@@ -173,7 +180,7 @@ impl Tight<'_> {
             if state.labelled[i] || state.regions[side].bound[i] > value {
                 continue;
             }
-            // How much farther the other region is than the label needs, and how far the own one.
+            // How much farther the other region is than necessary for the label, and the distance of the own region.
             let slack = -state.regions[1 - side].bound[i] - value;
             let apart = value - state.regions[side].bound[i];
             if slack >= 0.0 {
@@ -183,7 +190,7 @@ impl Tight<'_> {
                 candidates.push(key(cost, t));
             }
         }
-        let mut patience = PATIENCE[usize::from(self.shore.is_some())] * open.len() as u64 / 10;
+        let mut patience = PATIENCE[usize::from(self.interface.is_some())] * open.len() as u64 / 10;
         let batch = room[side][level];
         self.place(
             state,
@@ -198,7 +205,7 @@ impl Tight<'_> {
             },
             &mut patience,
         );
-        // First within the room of every level; then what would be handed down anyway may already be used below.
+        // First within the room of every level; then levels below may use room that would be passed down anyway.
         for hand_down in [false, true] {
             for _ in 0..ROUNDS {
                 if room[side][level] <= 0 {
@@ -213,7 +220,7 @@ impl Tight<'_> {
                         t,
                     );
                 }
-                let mut patience = PATIENCE[usize::from(self.shore.is_some())] * open.len() as u64 / 10;
+                let mut patience = PATIENCE[usize::from(self.interface.is_some())] * open.len() as u64 / 10;
                 let pass = Pass {
                     batch: 1,
                     refusals: REFUSALS,
@@ -226,7 +233,8 @@ impl Tight<'_> {
         }
     }
 
-    /// Tries candidates in order until the level is full, `refusals` in a row are refused, or `patience` is spent; tells whether any found a place.
+    /// Tries candidates in order until the level is full, `refusals` in a row are refused, or `patience` is spent;
+    /// returns whether any was placed.
     #[allow(clippy::too_many_arguments, reason = "the state of one level")]
     fn place(
         &self,
@@ -241,7 +249,7 @@ impl Tight<'_> {
         let mut batch = pass.batch;
         let value = level as f64 * self.height;
         // Labels within their distances to a given interface cannot come too near to the other region.
-        let floor = if self.shore.is_some_and(|shore| !shore.across) {
+        let floor = if self.interface.is_some_and(|interface| !interface.across) {
             0.0
         } else {
             -value - self.bin
@@ -259,7 +267,7 @@ impl Tight<'_> {
                 let t = triangle(candidates[next]);
                 let of = self.weights[t as usize];
                 next += 1;
-                // What is too large for the room is passed over.
+                // Triangles too large for the room are skipped.
                 if of > room[side][level] - weight + self.tolerance {
                     continue;
                 }
@@ -306,7 +314,9 @@ impl Tight<'_> {
         placed
     }
 
-    /// Triangles without a label get one between their bounds: a mixture of two functions that obey all bounds obeys them too. Of the mixtures that one is taken which leaves the regions the sizes they should have. Returns the weight of those that the histogram had no label for.
+    /// Assigns labels between the bounds to the remaining triangles: a mixture of two functions that obey all bounds
+    /// obeys them too. The mixture is chosen so that both regions have their required sizes. Returns the weight of the
+    /// triangles for which the histogram had no label.
     fn extend(&self, state: &mut State<'_>, rest_rooms: &[[i64; 2]]) -> i64 {
         let (lower, upper) = bounds(self.graph, &state.labelled, &state.label);
         // In the bins beside the interface, if the bounds allow it.
@@ -325,7 +335,9 @@ impl Tight<'_> {
                     (lower[t as usize], upper[t as usize])
                 }
             };
-            if let Some(Shore { distance, .. }) = self.shore.filter(|of| of.distance[piece[0] as usize].is_finite()) {
+            if let Some(GivenInterface { distance, .. }) =
+                self.interface.filter(|of| of.distance[piece[0] as usize].is_finite())
+            {
                 for &t in &open {
                     let x = distance[t as usize].clamp(-within, within);
                     let (low, high) = allowed(t);
@@ -375,7 +387,7 @@ impl Tight<'_> {
                     left += weight;
                 }
             }
-            // A border that runs through a triangle is no leftover.
+            // A triangle crossed by the interface is not a leftover.
             let border = open.iter().map(|&t| self.weights[t as usize]).max().unwrap_or_default();
             left += [0, 1]
                 .map(|side| (beside[side] - rest[side].max(0) - border).max(0))
@@ -386,9 +398,9 @@ impl Tight<'_> {
     }
 }
 
-/// How far each triangle's centroid is from the nearest of the other region.
+/// Distance of each triangle's centroid from the nearest one of the other region.
 fn to_the_other_region(graph: &DualGraph, distance: &[f64]) -> Vec<f64> {
-    let shore = (0..graph.len()).filter_map(|t| {
+    let interface = (0..graph.len()).filter_map(|t| {
         let beyond = |link: &&Link| distance[link.to as usize].is_sign_negative() != distance[t].is_sign_negative();
         let near = graph
             .links(t)
@@ -398,10 +410,11 @@ fn to_the_other_region(graph: &DualGraph, distance: &[f64]) -> Vec<f64> {
             .reduce(f64::min)?;
         Some((t, near))
     });
-    graph.distances(&shore.collect::<Vec<_>>())
+    graph.distances(&interface.collect::<Vec<_>>())
 }
 
-/// A candidate: its cost, which is not negative, before its number, so that whole numbers sort as both do.
+/// A candidate as one integer: its cost, which is not negative, in the upper half and its number in the lower, so that
+/// integers sort by cost, then number.
 fn key(cost: f64, t: u32) -> u64 {
     u64::from(single(cost).to_bits()) << 32 | u64::from(t)
 }

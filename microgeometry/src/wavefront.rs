@@ -1,14 +1,15 @@
-//! Triangles in the order in which falling values reach them: a queue of buckets.
+//! A bucket queue of triangles by decreasing value.
 
 use crate::conversions::whole_part;
 
-/// Buckets in reach of the current one; what lies farther waits aside.
+/// Number of buckets from the current one on; entries beyond them wait in a list.
 const BUCKETS: usize = 1024;
 
-/// Values with their triangles, taken out from the highest bucket to the lowest; within a bucket in any order.
+/// Values with their triangles, removed from the highest bucket to the lowest; within a bucket in any order.
 ///
-/// A search over a graph with such a queue gives what it would give with an exact one: a triangle whose value is raised again while its bucket is emptied is put in again. No bucket is left before it is empty, so with buckets narrower than an edge that is seldom.
-/// Putting in and taking out cost constant time.
+/// A search over a graph with such a queue has the same result as with an exact one: a triangle whose value is raised
+/// again while its bucket is emptied is inserted again. No bucket is left before it is empty, so this is rare with
+/// buckets narrower than an edge. Insertion and removal take constant time.
 pub(crate) struct Wavefront {
     /// Buckets per unit of value.
     per_unit: f64,
@@ -17,13 +18,13 @@ pub(crate) struct Wavefront {
     buckets: Vec<Vec<(f64, u32)>>,
     /// The bucket that is being emptied.
     at: usize,
-    /// No bucket behind this one holds anything.
+    /// All buckets after this one are empty.
     last: usize,
     beyond: Vec<(f64, u32)>,
 }
 
 impl Wavefront {
-    /// With buckets of this width, or of 1 if it is none.
+    /// With buckets of this width, or of 1 if it is not positive and finite.
     pub(crate) fn new(width: f64) -> Self {
         let per_unit = width.recip();
         Self {
@@ -40,7 +41,7 @@ impl Wavefront {
         }
     }
 
-    /// Empties it, to be filled with values from `top` downwards.
+    /// Clears the queue for values from `top` downwards.
     pub(crate) fn restart(&mut self, top: f64) {
         for bucket in &mut self.buckets[self.at..=self.last] {
             bucket.clear();
@@ -50,7 +51,7 @@ impl Wavefront {
     }
 
     pub(crate) fn push(&mut self, value: f64, triangle: u32) {
-        // What is above the bucket that is being emptied comes out of it, next.
+        // Values above the current bucket go into it and come out next.
         let place = whole_part((self.top - value) * self.per_unit).max(self.at);
         if place < BUCKETS {
             self.buckets[place].push((value, triangle));
@@ -88,7 +89,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// What goes in comes out, from high to low within the width of a bucket, however far values lie apart.
+        /// All entries come out, from high to low within the width of a bucket, however large the gaps.
         #[test]
         fn values_fall(values in prop::collection::vec(-1e4..0.0_f64, 1..200), width in 1e-3..10.0_f64) {
             let mut front = Wavefront::new(width);

@@ -1,7 +1,7 @@
-//! Drawn photos of half a megapixel and of two, and label files.
+//! Synthetic test images of half a megapixel and of two, and label maps.
 
 #![allow(missing_docs, reason = "made by criterion's macro")]
-#![allow(clippy::cast_possible_truncation, reason = "levels of a drawn picture")]
+#![allow(clippy::cast_possible_truncation, reason = "levels of a synthetic test image")]
 
 use std::{hint::black_box, ops::ControlFlow, time::Duration};
 

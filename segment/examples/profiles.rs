@@ -1,6 +1,7 @@
-//! Profiles of a photo: `cargo run -p stereology-segment --example profiles -- PHOTO [FOLDER]`; without a photo, of a drawn one.
+//! Profiles of a photo: `cargo run -p stereology-segment --example profiles -- PHOTO [FOLDER]`; without a photo, of a
+//! synthetic test image.
 
-#![allow(clippy::cast_possible_truncation, reason = "levels of a drawn picture")]
+#![allow(clippy::cast_possible_truncation, reason = "levels of a synthetic test image")]
 #![allow(clippy::print_stdout, reason = "a program")]
 
 use std::{error::Error, ops::ControlFlow, path::PathBuf};
@@ -32,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         write_labels(folder.join("labels.tif"), segmentation.labels.view())?;
         segmentation.overlay().save(folder.join("overlay.png"))?;
         segmentation.means().save(folder.join("means.png"))?;
-        segmentation.residual_picture().save(folder.join("residual.png"))?;
+        segmentation.residual_image().save(folder.join("residual.png"))?;
     }
     Ok(())
 }

@@ -2,7 +2,8 @@
 
 /// Index of a pixel, label or basin in 32 bits.
 ///
-/// Photos and label maps of more than 2³¹ pixels are refused before they are worked on, so every index fits; an array beyond that, passed to a single step, gets `u32::MAX`, which stands for no pixel.
+/// Photos and label maps of more than 2³¹ pixels are refused before they are worked on, so every index fits; an array
+/// beyond that, passed to a single step, gets `u32::MAX`, which stands for no pixel.
 pub(crate) fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
@@ -13,7 +14,8 @@ pub(crate) fn single(v: f64) -> f32 {
     v as f32
 }
 
-/// Whole part of a number; 0 of negative numbers and of those that are not numbers, the largest index of those beyond it.
+/// Whole part of a number; 0 of negative numbers and of those that are not numbers, the largest index of those beyond
+/// it.
 #[allow(clippy::cast_possible_truncation, reason = "rounds towards 0 and saturates")]
 pub(crate) fn whole_part(v: f64) -> usize {
     v as usize

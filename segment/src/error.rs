@@ -1,4 +1,4 @@
-//! What can go wrong between a photograph and its profiles.
+//! Errors of reading, segmenting and writing.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ pub enum SegmentError {
     Open {
         /// File as given.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file holds no bytes.
@@ -20,16 +20,18 @@ pub enum SegmentError {
         /// File as given.
         path: PathBuf,
     },
-    /// The file is no picture of a known format, or is cut short.
-    #[error("{}: not a readable picture ({reason}); give a whole PNG, JPEG or TIFF", path.display())]
+    /// The file is not an image of a known format, or is truncated.
+    #[error("{}: not a readable image ({reason}); give a complete PNG, JPEG or TIFF", path.display())]
     Decode {
         /// File as given.
         path: PathBuf,
-        /// What the decoder says.
+        /// Error of the decoder.
         reason: String,
     },
     /// Too few pixels to hold particles and a binder.
-    #[error("the photo is {width} x {height} pixels; at least 16 x 16 are needed to tell particles from a binder")]
+    #[error(
+        "the photo is {width} x {height} pixels; at least 16 x 16 are needed to distinguish particles from a binder"
+    )]
     TooSmall {
         /// Pixels in a row.
         width: u32,
@@ -38,7 +40,7 @@ pub enum SegmentError {
     },
     /// More pixels than are allowed.
     #[error(
-        "the photo is {width} x {height} pixels, more than {most}; it would take about {gigabytes} gigabytes of memory: allow more pixels, or cut or shrink the photo"
+        "the photo is {width} x {height} pixels, more than {most}; it would take about {gigabytes} gigabytes of memory: allow more pixels, or crop or shrink the photo"
     )]
     TooLarge {
         /// Pixels in a row.
@@ -52,23 +54,23 @@ pub enum SegmentError {
     },
     /// Every pixel has the same colour.
     #[error(
-        "the photo has a single colour, {colour:?}; there is nothing to separate: check that the right file was exported"
+        "the photo has a single colour, {colour:?}; there is nothing to segment: check that the right file was exported"
     )]
     SingleColour {
         /// That colour.
         colour: [u8; 3],
     },
-    /// Nothing stands out from the binder.
+    /// Nothing differs clearly from the binder.
     #[error(
-        "no particle of at least {min_area} pixels stands out from the binder; give the binder's colour, lower the least area, or import a label map drawn by hand or by another tool"
+        "no particle of at least {min_area} pixels differs clearly from the binder; give the binder's colour, lower the least area, or import a label map drawn by hand or by another tool"
     )]
     NoParticles {
-        /// Least area asked for, pixels.
+        /// Requested least area, pixels.
         min_area: usize,
     },
     /// The label map does not fit the photo.
     #[error(
-        "the label map is {}x{} pixels, the photo {}x{}; export the labels at the photo's size, not turned or cropped",
+        "the label map is {}x{} pixels, the photo {}x{}; export the labels at the photo's size, not rotated or cropped",
         labels[0], labels[1], photo[0], photo[1]
     )]
     LabelSize {
@@ -78,18 +80,18 @@ pub enum SegmentError {
         photo: [usize; 2],
     },
     /// The label map has no label but 0.
-    #[error("the label map holds no profile: every pixel is 0, which is the binder")]
+    #[error("the label map contains no profile: every pixel is 0, which is the binder")]
     NoLabels,
     /// The label map holds classes, not profiles.
     #[error(
-        "the label map holds only the values {values} beside 0, in {pieces} pieces: a mask of classes (binder and particle; or binder, inside, edge), not a number for each profile; export the label image \
+        "the label map contains only the values {values} besides 0, in {components} connected components: a mask of classes (binder and particle; or binder, inside, edge), not a number for each profile; export the label image \
          instead (segmenteverygrain: the GeoJSON or the instance labels; ImageJ: Analyze Particles, Count Masks; scikit-image: measure.label)"
     )]
     ClassMask {
         /// The values.
         values: String,
-        /// Connected pieces of them.
-        pieces: usize,
+        /// Their number of connected components.
+        components: usize,
     },
     /// The label file cannot be read as labels, or written.
     #[error("{}: {reason}", path.display())]

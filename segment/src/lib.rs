@@ -1,23 +1,20 @@
 //! Profiles of particles from a photograph of a section: binder, labels, colours, residual.
 //!
-//! A cut stone shows particles in a binder. Unfolding needs the size of each cut particle, its profile; the solid texture needs its colour, and what is left when the mean colours are taken away.
+//! A cut stone shows particles in a binder. Unfolding needs the size of each sectioned particle, its profile; the solid
+//! texture needs its colour, and the residual that remains when the mean colours are subtracted.
 //!
 //! ```text
 //! photo / 255, smoothed → binder b(x, y), scatter Σ → z = √((p − b)ᵀ Σ⁻¹ (p − b)) → hysteresis at z = 5 / 9
-//!       → outlines at half contrast: (p − b)·(c − b) ≥ ½ |c − b|²  → touching particles apart: by colour, then by shape
+//!       → outlines at half contrast: (p − b)·(c − b) ≥ ½ |c − b|²  → touching particles split: by colour, then by shape
 //! photo / 255 = means + residual
 //! ```
 //!
-//! The binder is found, not given: it is the colour that most pixels share for how little it scatters, under light that may change across the photo as a quadratic surface. Particles may be lighter and darker
-//! than it at once, which no single threshold of grey levels can separate. Half contrast keeps areas unbiased: outlines at the threshold itself would make every profile about a fifth too large.
+//! The binder is found automatically: of the main colours, it is the one with the most pixels for its scatter, under
+//! light that may vary across the photo as a quadratic surface. Particles may be lighter and darker than the binder in
+//! the same photo, which no single threshold of grey levels can separate. Half contrast keeps areas unbiased: outlines
+//! at the threshold itself would make every profile about a fifth too large.
 //!
-//! Drawn aggregates with exact truth, four of each kind, which took no part in choosing the constants below: mean AP50 .997 (easy), .983 (medium), .989 (hard: uneven light, noise, JPEG), area fraction off by
-//! .0, .2, .3 % on average. Before the steps named next it was .997, .976, .960 and .1, 1.8, .8 %.
-//!
-//! The steps were chosen on thirty others, where the scores are therefore in sample. [`faint_regions`] and spots given back to the particle they share half their outline with, together: AP50 +.003 on medium
-//! ones, +.013 on hard ones; lower thresholds for faint regions: +.003, 0; outlines by lightness as well as hue, with small flecks of compression dropped and strips at the photo's edge kept whole: 0, +.011.
-//! Tried and left out: a majority filter of outlines (no gain, and AP50 of a sand tomogram .765 to .691); two rounds of refinement instead of three (area error of hard ones .4 to .9 %); local contrast (AP50 of hard
-//! ones .986 to .969 and less). docs/segment.md has the table.
+//! The page `docs/segment.md` of the project describes what was tried and rejected, and links to the measured accuracy.
 //!
 //! # A photo of discs
 //!
@@ -25,7 +22,7 @@
 //! use std::ops::ControlFlow;
 //! use stereology_segment::{SegmentOptions, segment};
 //!
-//! // Nine dark discs of radius 12 on a pale ground with a little texture.
+//! // Nine dark discs of radius 12 on a pale background with a little texture.
 //! let photo = image::RgbImage::from_fn(150, 150, |x, y| {
 //!     let from_centre = |v: u32| f64::from(v % 50) - 24.5;
 //!     let inside = from_centre(x).hypot(from_centre(y)) < 12.0;

@@ -1,10 +1,10 @@
-//! What a segmentation may be told.
+//! Segmentation options.
 
 use stereology_metrics::EdgeRule;
 
 use crate::error::SegmentError;
 
-/// What becomes of binder-coloured holes inside a profile.
+/// What to do with binder-coloured holes inside a profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Holes {
     /// They belong to the profile: inclusions, highlights, engraving.
@@ -34,31 +34,35 @@ pub enum CategoryCount {
     /// The number from 2 to 8 with the best mean silhouette, one if that is below 0.5 (Rousseeuw 1987).
     #[default]
     Silhouette,
-    /// The first number from 1 to 8 whose gap to unstructured colours is not exceeded by the next one's by more than its standard error (Tibshirani, Walther & Hastie 2001).
+    /// The first number from 1 to 8 whose gap statistic is at least that of the next number minus its standard error
+    /// (Tibshirani, Walther & Hastie 2001).
     Gap,
     /// Given, 1 to 255.
     Given(usize),
 }
 
-/// How to segment. `Default` is what a photo of a cut stone needs.
+/// How to segment. The default suits photos of cut stone.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SegmentOptions {
     /// Where the binder's colour comes from.
     pub binder: BinderChoice,
-    /// Least area of a profile in pixels; smaller ones are dropped, and unfolding is told so by [`crate::Segmentation::min_size`].
+    /// Least area of a profile in pixels; smaller ones are removed, and [`crate::Segmentation::min_size`] passes the
+    /// limit on to unfolding.
     pub min_area: usize,
     /// Number of colour categories.
     pub categories: CategoryCount,
     /// Holes in profiles.
     pub holes: Holes,
-    /// Which profiles count at the photo's edges, and how much. Rules that need the whole size of profiles that the edge cuts are refused: the counting frame and plus-sampling.
+    /// Which profiles count at the photo's edges, and how much. Rules that need the whole size of profiles that the
+    /// edge cuts are refused: the counting frame and plus-sampling.
     pub edge_rule: EdgeRule,
-    /// Distances to the binder, in its standard deviations, at which a region ends and which it must reach.
+    /// Low and high hysteresis thresholds, in standard deviations of the binder colour.
     pub thresholds: [f32; 2],
-    /// Height that parts of a region must stand above their neck to be particles of their own: pixels, and share of the lower part's depth; the larger counts. The h of h-maxima.
+    /// Minimum peak-to-saddle height for splitting touching particles, the h of h-maxima: pixels, and a fraction of the
+    /// lower peak's depth; the larger counts.
     pub rise: [f32; 2],
-    /// Standard deviation of the smoothing before anything else, pixels.
+    /// Standard deviation of the Gaussian filter applied first, pixels.
     pub smoothing: f32,
     /// Seed of every random choice.
     pub seed: u64,
@@ -109,10 +113,10 @@ impl SegmentOptions {
         self
     }
 
-    /// Height of parts above their necks: pixels, and share of their depth.
+    /// Minimum peak-to-saddle height: pixels, and a fraction of the peak's depth.
     #[must_use]
-    pub const fn with_rise(mut self, pixels: f32, share: f32) -> Self {
-        self.rise = [pixels, share];
+    pub const fn with_rise(mut self, pixels: f32, fraction: f32) -> Self {
+        self.rise = [pixels, fraction];
         self
     }
 
@@ -123,7 +127,7 @@ impl SegmentOptions {
         self
     }
 
-    /// What becomes of holes.
+    /// What to do with holes in profiles.
     #[must_use]
     pub const fn with_holes(mut self, holes: Holes) -> Self {
         self.holes = holes;
@@ -137,7 +141,7 @@ impl SegmentOptions {
         self
     }
 
-    /// Lower and upper threshold of the hysteresis, in standard deviations of the binder.
+    /// Low and high hysteresis thresholds, in standard deviations of the binder colour.
     #[must_use]
     pub const fn with_thresholds(mut self, low: f32, high: f32) -> Self {
         self.thresholds = [low, high];

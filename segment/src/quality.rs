@@ -1,4 +1,5 @@
-//! What to know before trusting a segmentation: is there a binder, are there enough profiles, would other thresholds find others?
+//! Findings on the reliability of a segmentation: is there a binder, are there enough profiles, does their number
+//! depend on the thresholds?
 
 use ndarray::Array2;
 use stereology_imaging::connected_components;
@@ -13,24 +14,25 @@ use crate::outlines::half_contrast::{SHARP, half_contrast};
 use crate::outlines::regions::{fill_holes, hysteresis, open};
 use stereology_metrics::Finding;
 
-/// Fewest profiles that make a distribution of sizes.
+/// Fewest profiles for a size distribution.
 const FEW: usize = 50;
-/// Percent of the profiles at the photo's edge that is worth a warning.
+/// Percentage of profiles at the photo's edge beyond which there is a warning.
 const EDGE: f64 = 20.0;
-/// Percent of the profiles near the least area that is worth a warning.
+/// Percentage of profiles near the least area beyond which there is a warning.
 const SMALL: f64 = 10.0;
-/// Factors that show whether a number was a matter of luck.
-const MOVED: [f32; 3] = [0.8, 1.0, 1.2];
-/// Side of the part of the photo in which other thresholds are tried, pixels.
-const JUDGED: usize = 600;
-/// Change of the number of profiles, percent, that is worth a warning.
+/// Factors by which a parameter is varied.
+const FACTORS: [f32; 3] = [0.8, 1.0, 1.2];
+/// Side of the central part of the photo in which other thresholds are tried, pixels.
+const TRIED_SIDE: usize = 600;
+/// Change of the number of profiles, percent, beyond which there is a warning.
 const UNSTABLE: f64 = 10.0;
-/// Area fractions beyond which something is wrong, or unusual.
+/// Range of usual area fractions.
 const USUAL: std::ops::RangeInclusive<f64> = 0.01..=0.7;
-/// Area fraction at which nothing is left to be a binder.
+/// Area fraction beyond which hardly anything is left to be a binder.
 const ALL: f64 = 0.85;
 
-/// What the profiles themselves show: an unusual area fraction, too few profiles, many at the edge or near the least area.
+/// Findings on the profiles themselves: an unusual area fraction, too few profiles, many at the edge or near the least
+/// area.
 pub(crate) fn profile_findings(
     profiles: &[Profile],
     area_fraction: f64,
@@ -64,12 +66,13 @@ pub(crate) fn profile_findings(
     let is_small = |p: &&Profile| p.area < 1.5 * options.min_area as f64;
     let small = percent(profiles.iter().filter(is_small).count());
     if small > SMALL {
-        findings.push(Finding::new("near-minimum", format!("{small:.0} % of the profiles are within half of the least area of {} pixels: many more may be too small to be seen; use a photo of higher resolution", options.min_area)));
+        findings.push(Finding::new("near-minimum", format!("{small:.0} % of the profiles are within half of the least area of {} pixels: many more may be too small to be detected; use a photo of higher resolution", options.min_area)));
     }
     findings
 }
 
-/// How the number of profiles changes with other thresholds and another rise: each a fifth lower, as it is and a fifth higher.
+/// How the number of profiles changes with other thresholds and another rise: each a fifth lower, as it is and a fifth
+/// higher.
 pub(crate) fn count_findings(thresholds: [usize; 3], rise: [usize; 3]) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, [lower, here, higher]) in [("thresholds", thresholds), ("rise", rise)] {
@@ -83,7 +86,8 @@ pub(crate) fn count_findings(thresholds: [usize; 3], rise: [usize; 3]) -> Vec<Fi
     findings
 }
 
-/// Whether there is a binder: it covers the fraction `covered` of the photo, and `is_clear` if the particles stand apart from it.
+/// Whether there is a binder: it covers the fraction `covered` of the photo, and `is_clear` if the particles stand
+/// apart from it.
 pub(crate) fn binder_finding(covered: f64, is_clear: bool, area_fraction: f64) -> Option<Finding> {
     let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
     let percent = |fraction: f64| 100.0 * fraction;
@@ -107,7 +111,8 @@ pub(crate) fn binder_finding(covered: f64, is_clear: bool, area_fraction: f64) -
     Some(Finding::new("no-binder", message))
 }
 
-/// Numbers of profiles in the middle of the photo with thresholds a fifth lower, as they are and a fifth higher: the recipe without its repetitions.
+/// Numbers of profiles in the middle of the photo with thresholds a fifth lower, as they are and a fifth higher: by the
+/// same steps, but with one iteration of each.
 pub(crate) fn counts_by_threshold(
     distance: &Array2<f32>,
     deviation: &Array2<[f32; 3]>,
@@ -116,7 +121,7 @@ pub(crate) fn counts_by_threshold(
 ) -> [usize; 3] {
     let (distance, deviation) = (middle(distance), middle(deviation));
     let blur = options.smoothing.hypot(SHARP);
-    MOVED.map(|f| {
+    FACTORS.map(|f| {
         let mut mask = hysteresis(&distance, f * low, f * high);
         fill_holes(&mut mask, |hole, around| hole <= options.min_area.max(around / 20));
         open(&mut mask);
@@ -131,15 +136,15 @@ pub(crate) fn counts_by_threshold(
     })
 }
 
-/// The middle of a picture, [`JUDGED`] pixels wide and high at most.
-fn middle<T: Copy>(picture: &Array2<T>) -> Array2<T> {
-    let (height, width) = picture.dim();
-    let (rows, columns) = (height.min(JUDGED), width.min(JUDGED));
+/// The middle of an image, at most [`TRIED_SIDE`] pixels wide and high.
+fn middle<T: Copy>(image: &Array2<T>) -> Array2<T> {
+    let (height, width) = image.dim();
+    let (rows, columns) = (height.min(TRIED_SIDE), width.min(TRIED_SIDE));
     let (top, left) = ((height - rows) / 2, (width - columns) / 2);
-    Array2::from_shape_fn((rows, columns), |(y, x)| picture[[top + y, left + x]])
+    Array2::from_shape_fn((rows, columns), |(y, x)| image[[top + y, left + x]])
 }
 
-/// Numbers of hills with a rise a fifth lower, as it is and a fifth higher.
+/// Numbers of labels with a minimum peak-to-saddle height a fifth lower, as it is and a fifth higher.
 pub(crate) fn counts_by_rise(basins: &Basins, dim: (usize, usize), options: &SegmentOptions) -> [usize; 3] {
-    MOVED.map(|f| basins.count(required_rise(dim, options.rise.map(|r| f * r)), options.min_area))
+    FACTORS.map(|f| basins.count(required_rise(dim, options.rise.map(|r| f * r)), options.min_area))
 }

@@ -29,24 +29,25 @@ pub struct Segmentation {
     pub binder: Binder,
     /// Where profiles are counted.
     pub window: Window,
-    /// Share of the photo's area in profiles, cut ones included.
+    /// Fraction of the photo's area in profiles, cut ones included.
     pub area_fraction: f64,
     /// Sum of the weights over the window's area, per square pixel.
     pub number_per_area: f64,
-    /// Size of the smallest profile looked for, the circle of [`SegmentOptions::min_area`]: the truncation to hand to unfolding.
+    /// Equivalent circular diameter of [`SegmentOptions::min_area`]: the detection limit for unfolding.
     pub min_size: f64,
     /// Whether profiles of different categories differ in size; `None` for fewer than two categories.
     pub size_by_category: Option<KruskalWallis>,
-    /// What to know before trusting it. Codes of the photo: `alpha-over-white`, `no-binder`, `vague-binder`, `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`. Of a label map:
+    /// What to know before trusting it. Codes of the photo: `alpha-over-white`, `no-binder`, `vague-binder`,
+    /// `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`. Of a label map:
     /// `clipped-labels`, `split-label`, `small-labels`, `first-page`, `overlapping-labels`, `lost-labels`.
     pub findings: Vec<Finding>,
     pub(crate) photo: RgbImage,
-    /// Pixels that stood out but were left out: too small, or flecks.
+    /// Pixels of the mask that belong to no profile: too small, or flecks.
     pub(crate) rejected: Vec<[usize; 2]>,
 }
 
 impl Segmentation {
-    /// Everything that follows from labels and photo; labels of small profiles become 0.
+    /// All measurements from labels and photo; labels of small profiles become 0.
     pub(crate) fn measured(photo: &RgbImage, mut labels: Array2<u32>, options: &SegmentOptions) -> Self {
         let mut profiles = measure(photo, &labels, options.min_area);
         let ids: Vec<u32> = profiles.iter().map(|p| p.id).collect();

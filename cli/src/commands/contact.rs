@@ -8,9 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::grid::read_npy;
 use stereology::imaging::otsu;
-use stereology::microgeometry::{
-    self, ContactDistribution, EstimateOptions, Law, contact_of_picture, contact_of_volume,
-};
+use stereology::microgeometry::{self, ContactDistribution, EstimateOptions, Law, contact_of_image, contact_of_volume};
 use stereology::segment::{read_labels, read_photo};
 
 use crate::answer::{Answer, Fields, Notes};
@@ -186,7 +184,7 @@ impl Contact {
         }
         if self.labels {
             let map = read_labels(image).at(image)?;
-            let of = contact_of_picture(map.mapv(|label| label != 0).view(), &options).at(image)?;
+            let of = contact_of_image(map.mapv(|label| label != 0).view(), &options).at(image)?;
             return Ok(Source {
                 of,
                 threshold: None,
@@ -209,7 +207,7 @@ impl Contact {
             (0.299 * r + 0.587 * g + 0.114 * b).round() as u8
         });
         let threshold = self.threshold_for(grey.iter().copied(), image)?;
-        let of = contact_of_picture(grey.mapv(|v| f64::from(v) > threshold).view(), &options).at(image)?;
+        let of = contact_of_image(grey.mapv(|v| f64::from(v) > threshold).view(), &options).at(image)?;
         Ok(Source {
             of,
             threshold: Some(threshold),

@@ -302,9 +302,9 @@ pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64) -> R
     profiles::write(folder.file("profiles.csv"), found, scale).or_fail()?;
     for (name, picture) in [
         ("overlay.png", found.overlay()),
-        ("binder.png", found.binder_picture()),
+        ("binder.png", found.binder_image()),
         ("means.png", found.means()),
-        ("residual.png", found.residual_picture()),
+        ("residual.png", found.residual_image()),
     ] {
         let path = folder.file(name);
         picture.save(&path).at(&path)?;

@@ -1,10 +1,10 @@
-//! What cannot be is refused, with what to do.
+//! Invalid input is refused with advice.
 
 use std::ops::ControlFlow;
 
 use ndarray::Array2;
 use stereology_microgeometry::{
-    ContactDistribution, Design, EstimateOptions, MicrogeometryError, Offset, ReconstructOptions, contact_of_picture,
+    ContactDistribution, Design, EstimateOptions, MicrogeometryError, Offset, ReconstructOptions, contact_of_image,
     displace, reconstruct, refined, to_distribution_units,
 };
 use stereology_shape::{Subdivision, TriangleMesh};
@@ -128,21 +128,21 @@ fn odd_meshes_are_handled() {
 #[test]
 fn pictures_of_one_region() {
     let white = Array2::from_elem((5, 5), true);
-    let refused = contact_of_picture(white.view(), &EstimateOptions::default());
+    let refused = contact_of_image(white.view(), &EstimateOptions::default());
     assert!(matches!(refused, Err(MicrogeometryError::OneRegion(_))));
     let none = Array2::from_elem((0, 0), true);
-    assert!(contact_of_picture(none.view(), &EstimateOptions::default()).is_err());
+    assert!(contact_of_image(none.view(), &EstimateOptions::default()).is_err());
     let half = Array2::from_shape_fn((2, 2), |(y, _)| y > 0);
     let wrong = EstimateOptions {
         pixel_size: -1.0,
         ..EstimateOptions::default()
     };
-    assert!(contact_of_picture(half.view(), &wrong).is_err());
+    assert!(contact_of_image(half.view(), &wrong).is_err());
     let wrong = EstimateOptions {
         bins: Some(0),
         ..EstimateOptions::default()
     };
-    assert!(contact_of_picture(half.view(), &wrong).is_err());
+    assert!(contact_of_image(half.view(), &wrong).is_err());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::on;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Every design is in its ranges, moves something, and comes back from its file.
+    /// Every design is in its ranges, displaces at least one region, and survives the round trip through its file.
     #[test]
     fn designs_stay_in_their_ranges(seed in any::<u32>(), number in 0..1000_u64) {
         let ranges = Exploration { units: [30.0, 50.0], shares: [0.2, 0.4], ..Exploration::default() };
@@ -28,7 +28,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// What is drawn is what a surface can have: densities fall from the interface on, and as much of one region lies next to it as of the other.
+    /// Only distributions that a surface can have are drawn: densities decrease away from the interface, where they are
+    /// the same for both regions.
     #[test]
     fn drawn_distributions_can_be_had(seed in any::<u32>(), number in 0..1000_u64) {
         let of = Exploration::default().design(u64::from(seed), number).unwrap().contact;
@@ -42,7 +43,7 @@ proptest! {
     }
 }
 
-/// And surfaces have them: distances measured again are as the distribution asks.
+/// Surfaces can have these distributions: distances measured again follow them.
 #[test]
 fn drawn_distributions_are_measured_again() {
     let ball = TriangleMesh::icosphere(2.0, 5);

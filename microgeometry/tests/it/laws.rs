@@ -1,4 +1,4 @@
-//! What holds for every mesh, distribution and seed.
+//! Laws that hold for every mesh, distribution and seed.
 
 use proptest::prelude::*;
 use stereology_microgeometry::{
@@ -28,7 +28,8 @@ fn mesh_of(kind: usize) -> TriangleMesh {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// No two neighbours differ by more than their distance, so no two triangles do; and the labels of the whole surface sum to one.
+    /// No two neighbours differ by more than their distance, so no two triangles do; and the labels of the whole
+    /// surface sum to one.
     #[test]
     fn labels_never_change_faster_than_the_way(
         kind in 0..4_usize,
@@ -52,7 +53,7 @@ proptest! {
         prop_assert!((0.0..=1.0).contains(&made.left_over) && made.misplaced <= 1.0 + 1e-9);
     }
 
-    /// A mesh twice as large with bins twice as wide is the same thing.
+    /// A mesh twice as large with bins twice as wide gets the same labels, doubled.
     #[test]
     fn scaling_mesh_and_bins_together_changes_nothing(factor in prop::sample::select(vec![0.25, 0.5, 2.0, 8.0]), seed in 0..50_u64) {
         let mesh = TriangleMesh::torus(2.0, 0.7, 40, 20);
@@ -66,7 +67,8 @@ proptest! {
     }
 }
 
-/// As many labels a bin as the histogram has, to a per cent of the triangles, where every triangle counts one and the distribution can be held.
+/// Each bin has as many labels as the histogram requires, to a per cent of the triangles, where every triangle counts
+/// one and the mesh can have the distribution.
 #[test]
 fn counts_are_those_of_the_histogram() {
     let mesh = TriangleMesh::icosphere(2.0, 5);

@@ -1,4 +1,4 @@
-//! Laws of the whole: labels keep their distances and their distribution, whatever the mesh.
+//! Laws of reconstructions: labels obey their bounds and their distribution on any mesh.
 
 #![allow(clippy::unwrap_used)] // a test that cannot set itself up should stop there
 #![allow(clippy::cast_possible_truncation)] // pixels and triangles of small tests
@@ -18,12 +18,12 @@ use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_microgeometry::{
-    ContactDistribution, EstimateOptions, ReconstructOptions, Reconstruction, contact_of_picture, reconstruct,
+    ContactDistribution, EstimateOptions, ReconstructOptions, Reconstruction, contact_of_image, reconstruct,
     to_distribution_units,
 };
 use stereology_shape::TriangleMesh;
 
-/// A periodic random field cut at zero: waves of about one length in all directions.
+/// A periodic random field thresholded at zero: waves of about one length in all directions.
 fn random_field(seed: u64, wave: f64) -> ContactDistribution {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let n = 256.0;
@@ -42,7 +42,7 @@ fn random_field(seed: u64, wave: f64) -> ContactDistribution {
             .sum::<f64>()
             > 0.0
     });
-    contact_of_picture(picture.view(), &EstimateOptions::default()).unwrap()
+    contact_of_image(picture.view(), &EstimateOptions::default()).unwrap()
 }
 
 fn on(mesh: &TriangleMesh, units: f64, of: &ContactDistribution, options: &ReconstructOptions) -> Reconstruction {

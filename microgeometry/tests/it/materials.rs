@@ -1,4 +1,4 @@
-//! How well distributions are rebuilt.
+//! Accuracy of reconstructed distributions.
 
 use nalgebra::Vector3;
 use stereology_microgeometry::{ContactDistribution, Law, Method, Metric, ReconstructOptions};
@@ -6,7 +6,8 @@ use stereology_shape::TriangleMesh;
 
 use crate::{on, random_field};
 
-/// A random field on 20,480 triangles: nothing left over, labels to a tenth of a bin, measured again to less than half a bin.
+/// A random field on 20,480 triangles: nothing left over, labels to a tenth of a bin, measured again to less than half
+/// a bin.
 #[test]
 fn random_fields_are_rebuilt() {
     let of = random_field(1, 26.0);
@@ -32,7 +33,9 @@ fn random_fields_are_rebuilt() {
     }
 }
 
-/// Distances measured again are as asked for long waves, for thin structures, on thin bodies, on triangles much smaller and about as large as bins. The first row was 1.1 bins off before the interface was moved, the third 1.3.
+/// Distances measured again follow the distribution for long waves, thin structures, thin bodies, and triangles much
+/// smaller than bins and about as large. Without moving the interface the error of the first row was 1.1 bins, that of
+/// the third 1.3.
 #[test]
 fn distances_measured_again_are_as_asked() {
     let thin = ContactDistribution::from_laws(1.0, Law::Exponential(1.5), Law::Exponential(0.4), 0.2).unwrap();
@@ -63,7 +66,7 @@ fn the_papers_method_leaves_triangles_over() {
     assert!((0.03..0.15).contains(&mean), "{shares:?}");
 }
 
-/// A distribution whose distances are longer than the mesh is told to be so, and still gives valid labels.
+/// A distribution with distances longer than the mesh is reported as such, and its labels are still valid.
 #[test]
 fn what_a_mesh_cannot_hold_is_told() {
     let of = ContactDistribution::from_laws(1.0, Law::Uniform(30.0), Law::Uniform(30.0), 0.5).unwrap();
@@ -79,7 +82,8 @@ fn what_a_mesh_cannot_hold_is_told() {
     assert!(first.bin < -15 && first.got < first.wanted, "{first:?}");
 }
 
-/// With lengths along an axis shrunk, structures are longer along it: points at one distance agree more often along it than across.
+/// With lengths along an axis shrunk, structures are longer along it: points at a given distance are in the same region
+/// more often along it than across.
 #[test]
 fn an_anisotropic_metric_draws_structures_out() {
     let of = random_field(2, 40.0);

@@ -1,4 +1,4 @@
-//! Open meshes, pieces, refinement, relief, simplification.
+//! Open meshes, connected components, refinement, relief, simplification.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -60,7 +60,8 @@ fn loop_works_on_open_meshes() {
     assert!((area(&fine) / area(&cup) - 1.0).abs() < 0.1);
 }
 
-/// One region alone has no interface: labels are distributed as asked all the same, on small triangles and on large ones.
+/// One region alone has no interface: labels still have the required distribution, on small triangles and on large
+/// ones.
 #[test]
 fn one_region_is_labelled_too() {
     for (negative, positive) in [(vec![], vec![3.0, 2.0, 1.0]), (vec![3.0, 2.0, 1.0], vec![])] {
@@ -78,7 +79,7 @@ fn one_region_is_labelled_too() {
     }
 }
 
-/// Every piece gets its share of both regions.
+/// Every connected component gets its fraction of both regions.
 #[test]
 fn pieces_get_their_shares() {
     let of = random_field(3, 18.0);
@@ -97,7 +98,8 @@ fn pieces_get_their_shares() {
     }
 }
 
-/// On a mesh with triangles of very different size the distribution is that of the area, or in the paper's way that of the triangles.
+/// On a mesh with triangles of very different size the distribution is that of the area, or, by the paper's method,
+/// that of the triangles.
 #[test]
 fn uneven_meshes_are_weighted_by_area() {
     let mut mesh = TriangleMesh::icosphere(2.0, 4);

@@ -21,7 +21,7 @@ fn cap(adjacency: Adjacency, rim: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     (interface_distances(&graph, &labels), labels, graph.areas().to_vec())
 }
 
-/// A cap of angle θ₀: the share of the sphere farther than r inside its rim is (1 − cos(θ₀ − r))/2.
+/// A cap of angle θ₀: the fraction of the sphere farther than r inside its rim is (1 − cos(θ₀ − r))/2.
 #[test]
 fn a_caps_distances_are_in_closed_form() {
     let rim = 1.0;

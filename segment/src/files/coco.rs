@@ -1,4 +1,4 @@
-//! Outlines as COCO annotations, as most labelling tools and networks write them.
+//! Outlines as COCO annotations, which most labelling tools and networks write.
 
 use std::io::{self, Write};
 
@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use crate::conversions::whole_part;
 use crate::labels::outline::{Outline, Ring, fill_outlines, outlines};
 
-/// Outlines of the annotations of the picture whose size is (height, width): polygons, or masks coded in runs. Numbers are the annotations' ids if they differ, else from 1.
+/// Outlines of the annotations of the image whose size is (height, width): polygons or run-length masks. Numbers are
+/// the annotations' ids if these are distinct, else from 1.
 pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec<Outline>, String> {
     let images = file["images"].as_array().map_or(&[][..], Vec::as_slice);
     let fits = |image: &&Value| {
@@ -20,7 +21,7 @@ pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec
         [one] if fits(&one) => one["id"].as_i64(),
         [one] => {
             return Err(format!(
-                "its picture is {}x{} pixels, the photo {width}x{height}; export the annotations at the photo's size",
+                "its image is {}x{} pixels, the photo {width}x{height}; export the annotations at the photo's size",
                 one["width"], one["height"]
             ));
         }
@@ -30,7 +31,7 @@ pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec
                 (Some(one), None) => one["id"].as_i64(),
                 _ => {
                     return Err(format!(
-                        "it holds annotations of {} pictures, and not exactly one has the photo's size of {width}x{height}; export those of one picture",
+                        "it contains annotations of {} images, and not exactly one has the photo's size of {width}x{height}; export those of one image",
                         several.len()
                     ));
                 }
@@ -57,19 +58,19 @@ pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec
     for (annotation, id) in ours.into_iter().zip(ids) {
         let at = |what: &str| format!("annotation {}: {what}", annotation["id"]);
         let segmentation = &annotation["segmentation"];
-        let pieces = if let Some(rings) = segmentation.as_array() {
+        let components = if let Some(rings) = segmentation.as_array() {
             rings
                 .iter()
                 .map(flat_ring)
                 .collect::<Option<Vec<_>>>()
-                .ok_or_else(|| at("the polygon is no list of numbers x, y, x, y, ..."))?
+                .ok_or_else(|| at("the polygon is not a list of numbers x, y, x, y, ..."))?
         } else if segmentation.is_object() {
             runs(segmentation, (height, width))
-                .ok_or_else(|| at("the coded mask is damaged or of another size than the photo"))?
+                .ok_or_else(|| at("the run-length mask is damaged or not of the photo's size"))?
         } else {
-            return Err(at("no segmentation; boxes alone are no outlines"));
+            return Err(at("no segmentation; boxes are not outlines"));
         };
-        found.push(Outline { id, pieces });
+        found.push(Outline { id, components });
     }
     Ok(found)
 }
@@ -88,7 +89,8 @@ fn flat_ring(ring: &Value) -> Option<Vec<Ring>> {
         .then(|| vec![corners.map(|c| [c[0], c[1]]).collect()])
 }
 
-/// Pieces of a mask of runs of zeros and ones down the columns, given as numbers or coded in letters.
+/// Components of a run-length mask (runs of zeros and ones down the columns), given as numbers or as a compressed
+/// string.
 fn runs(segmentation: &Value, (height, width): (usize, usize)) -> Option<Vec<Vec<Ring>>> {
     let size = &segmentation["size"];
     if size[0].as_u64()? != height as u64 || size[1].as_u64()? != width as u64 {
@@ -109,7 +111,7 @@ fn runs(segmentation: &Value, (height, width): (usize, usize)) -> Option<Vec<Vec
         }
         at = end;
     }
-    // The columns from the first to the last pixel are enough.
+    // Only the columns from the first to the last pixel are needed.
     let (Some(first), Some(last)) = (inside.first(), inside.last()) else {
         return Some(Vec::new());
     };
@@ -118,12 +120,17 @@ fn runs(segmentation: &Value, (height, width): (usize, usize)) -> Option<Vec<Vec
     for k in inside.into_iter().flatten() {
         mask[[k % height, k / height - left]] = 1;
     }
-    let mut pieces = outlines(&mask).pop().map_or(Vec::new(), |o| o.pieces);
-    pieces.iter_mut().flatten().flatten().for_each(|c| c[0] += left as f64);
-    Some(pieces)
+    let mut components = outlines(&mask).pop().map_or(Vec::new(), |o| o.components);
+    components
+        .iter_mut()
+        .flatten()
+        .flatten()
+        .for_each(|c| c[0] += left as f64);
+    Some(components)
 }
 
-/// Numbers in groups of five bits from the character `0` on, the sixth bit saying that more follow; from the fourth on they are differences to the number two before.
+/// Decodes numbers in groups of five bits, offset by the character `0`; the sixth bit means that more groups follow.
+/// From the fourth number on, differences to the number two before are stored.
 fn decode(code: &[u8]) -> Option<Vec<i64>> {
     let mut numbers: Vec<i64> = Vec::new();
     let mut bytes = code.iter();
@@ -151,7 +158,7 @@ fn decode(code: &[u8]) -> Option<Vec<i64>> {
     Some(numbers)
 }
 
-/// Writes one annotation a line: polygons, or runs for labels with holes, which COCO's polygons cannot have.
+/// Writes one annotation per line: polygons, or runs for labels with holes, which COCO's polygons cannot represent.
 pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline], (height, width): (usize, usize)) -> io::Result<()> {
     writeln!(
         out,
@@ -160,13 +167,13 @@ pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline], (height, width): 
     writeln!(out, r#""categories": [{{"id": 1, "name": "profile"}}],"#)?;
     writeln!(out, r#""annotations": ["#)?;
     for (i, outline) in outlines.iter().enumerate() {
-        let rings = || outline.pieces.iter().filter_map(|p| p.first());
+        let rings = || outline.components.iter().filter_map(|p| p.first());
         let bounds = rings()
             .flatten()
             .fold([f64::INFINITY, f64::INFINITY, 0.0, 0.0], |b: [f64; 4], c| {
                 [b[0].min(c[0]), b[1].min(c[1]), b[2].max(c[0]), b[3].max(c[1])]
             });
-        let holes = outline.pieces.iter().any(|p| p.len() > 1);
+        let holes = outline.components.iter().any(|p| p.len() > 1);
         let segmentation = if holes {
             json!({ "size": [height, width], "counts": counts(outline, bounds, (height, width)) })
         } else {
@@ -186,8 +193,12 @@ pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline], (height, width): 
 fn counts(outline: &Outline, bounds: [f64; 4], (height, width): (usize, usize)) -> Vec<usize> {
     let [left, top, right, bottom] = bounds.map(whole_part);
     let moved = |ring: &Ring| ring.iter().map(|c| [c[0] - left as f64, c[1] - top as f64]).collect();
-    let pieces = outline.pieces.iter().map(|p| p.iter().map(moved).collect()).collect();
-    let (box_, _) = fill_outlines(&[Outline { id: 1, pieces }], (bottom - top, right - left));
+    let components = outline
+        .components
+        .iter()
+        .map(|p| p.iter().map(moved).collect())
+        .collect();
+    let (box_, _) = fill_outlines(&[Outline { id: 1, components }], (bottom - top, right - left));
     let mut counts = vec![0];
     let mut at = false;
     let mut push = |value: bool, run: usize, counts: &mut Vec<usize>| {
@@ -213,9 +224,9 @@ fn counts(outline: &Outline, bounds: [f64; 4], (height, width): (usize, usize)) 
 mod tests {
     use super::*;
 
-    /// The string pycocotools gives for the runs 5, 3, 10, 3, 100: differences of two before from the fourth on.
+    /// The string that pycocotools writes for the runs 5, 3, 10, 3, 100: differences of two before from the fourth on.
     #[test]
-    fn letters() {
+    fn compressed_runs_are_decoded() {
         // 5 -> '5', 3 -> '3', 10 -> ':', 3 - 3 = 0 -> '0', 100 - 10 = 90 -> 26 | more, 2.
         assert_eq!(decode(b"53:0j2").unwrap(), [5, 3, 10, 3, 100]);
         assert!(decode(b"5\x01").is_none() && decode(b"j").is_none());

@@ -9,9 +9,11 @@ use crate::labels::outline::{Outline, Ring};
 /// Half a pixel: coordinates are those of pixel centres, from 0, as in segmenteverygrain.
 const CENTRE: f64 = 0.5;
 
-/// Outlines of the polygons of a feature collection, with the integers of a property `label` or `id` if every feature has its own, else numbered from 1.
+/// Outlines of the polygons of a feature collection, with the integers of a property `label` or `id` if every feature
+/// has its own, else numbered from 1.
 ///
-/// Where all y are at most 0, they are QGIS's of a picture without coordinates: minus the distance from the upper edge, corners at whole numbers.
+/// Where all y are at most 0, they are QGIS's of an image without coordinates: minus the distance from the upper edge,
+/// pixel corners at whole numbers.
 pub(crate) fn parse(file: &Value) -> Result<Vec<Outline>, String> {
     let single = [file.clone()];
     let features = match file["type"].as_str() {
@@ -21,7 +23,7 @@ pub(crate) fn parse(file: &Value) -> Result<Vec<Outline>, String> {
             .as_slice(),
         _ => &single,
     };
-    let mut pieces = Vec::new();
+    let mut components = Vec::new();
     for (i, feature) in features.iter().enumerate() {
         let geometry = if feature["geometry"].is_object() {
             &feature["geometry"]
@@ -37,26 +39,26 @@ pub(crate) fn parse(file: &Value) -> Result<Vec<Outline>, String> {
         };
         let rings = polygons
             .into_iter()
-            .map(|p| polygon(p).ok_or_else(|| at("coordinates are no rings of numbers")));
-        pieces.push(rings.collect::<Result<Vec<_>, _>>()?);
+            .map(|p| polygon(p).ok_or_else(|| at("coordinates are not rings of numbers")));
+        components.push(rings.collect::<Result<Vec<_>, _>>()?);
     }
-    let mut corners = pieces.iter().flatten().flatten().flatten();
-    if !pieces.is_empty() && corners.all(|c| c[1] <= 0.0) {
-        pieces
+    let mut corners = components.iter().flatten().flatten().flatten();
+    if !components.is_empty() && corners.all(|c| c[1] <= 0.0) {
+        components
             .iter_mut()
             .flatten()
             .flatten()
             .flatten()
             .for_each(|c| c[1] = -c[1]);
     } else {
-        let all = pieces.iter_mut().flatten().flatten().flatten();
+        let all = components.iter_mut().flatten().flatten().flatten();
         all.for_each(|c| *c = c.map(|v| v + CENTRE));
     }
     let ids = numbers(features);
     Ok(ids
         .into_iter()
-        .zip(pieces)
-        .map(|(id, pieces)| Outline { id, pieces })
+        .zip(components)
+        .map(|(id, components)| Outline { id, components })
         .collect())
 }
 
@@ -93,7 +95,7 @@ fn numbers(features: &[Value]) -> Vec<u32> {
     (1..).take(features.len()).collect()
 }
 
-/// Writes one feature a line.
+/// Writes one feature per line.
 pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline]) -> io::Result<()> {
     let ring = |ring: &Ring| -> Vec<[f64; 2]> {
         let closed = ring.iter().chain(ring.first());
@@ -101,10 +103,14 @@ pub(crate) fn write(out: &mut dyn Write, outlines: &[Outline]) -> io::Result<()>
     };
     writeln!(out, r#"{{"type": "FeatureCollection", "features": ["#)?;
     for (i, outline) in outlines.iter().enumerate() {
-        let pieces: Vec<Vec<_>> = outline.pieces.iter().map(|p| p.iter().map(ring).collect()).collect();
-        let geometry = match pieces.as_slice() {
-            [piece] => json!({ "type": "Polygon", "coordinates": piece }),
-            _ => json!({ "type": "MultiPolygon", "coordinates": pieces }),
+        let components: Vec<Vec<_>> = outline
+            .components
+            .iter()
+            .map(|p| p.iter().map(ring).collect())
+            .collect();
+        let geometry = match components.as_slice() {
+            [component] => json!({ "type": "Polygon", "coordinates": component }),
+            _ => json!({ "type": "MultiPolygon", "coordinates": components }),
         };
         let feature =
             json!({ "type": "Feature", "id": outline.id, "properties": { "label": outline.id }, "geometry": geometry });

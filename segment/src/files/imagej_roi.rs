@@ -1,6 +1,7 @@
-//! Outlines as ImageJ's regions of interest, as Fiji's ROI manager and StarDist keep them.
+//! Outlines as ImageJ's regions of interest, the format of Fiji's ROI manager and StarDist.
 //!
-//! The format is that of ImageJ's class `RoiDecoder`: 64 bytes of header, big endian, then corners as 16-bit numbers from the box's corner, as floats, or as a path of segments.
+//! The format is that of ImageJ's class `RoiDecoder`: 64 bytes of header, big endian, then corners as 16-bit numbers
+//! from the box's corner, as floats, or as a path of segments.
 
 use std::io::{self, Cursor, Read, Seek, Write};
 
@@ -14,18 +15,19 @@ pub(crate) const MAGIC: &[u8] = b"Iout";
 
 /// Bytes before the corners.
 const HEADER: usize = 64;
-/// Bytes that one region may have: some million corners.
+/// Most bytes of one region: some million corners.
 const LARGEST: u64 = 64 << 20;
 /// Corners that approximate an oval.
 const OVAL: usize = 256;
-/// Bit of the options that says that corners are floats.
+/// Bit of the options for corners in floats.
 const SUB_PIXEL: u16 = 128;
 /// Version written: that of ImageJ 1.52.
 const VERSION: u16 = 227;
 const TRACED: u8 = 8;
 const RECTANGLE: u8 = 1;
 
-/// Outlines of the regions of an archive, with the numbers N of names `label-N` if all have one, else numbered from 1; and how many regions have no area (points and lines), which are left out.
+/// Outlines of the regions of an archive, with the numbers N of names `label-N` if all have one, else numbered from 1;
+/// and how many regions have no area (points and lines), which are left out.
 pub(crate) fn parse_archive(bytes: &[u8]) -> Result<(Vec<Outline>, usize), String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| e.to_string())?;
     let mut found: Vec<(Option<u32>, Vec<Vec<Ring>>)> = Vec::new();
@@ -35,7 +37,8 @@ pub(crate) fn parse_archive(bytes: &[u8]) -> Result<(Vec<Outline>, usize), Strin
         let name = entry.name().map_err(|e| e.to_string())?.into_owned();
         if name.ends_with(".npy") {
             return Err(
-                "it is NumPy's archive of arrays, not ImageJ's of regions; save the label array alone as .npy".into(),
+                "it is a NumPy archive of arrays, not an ImageJ archive of regions; save the label array alone as .npy"
+                    .into(),
             );
         }
         if !name.ends_with(".roi") {
@@ -47,7 +50,7 @@ pub(crate) fn parse_archive(bytes: &[u8]) -> Result<(Vec<Outline>, usize), Strin
             .read_to_end(&mut region)
             .map_err(|e| format!("{name}: {e}"))?;
         match parse(&region).map_err(|e| format!("{name}: {e}"))? {
-            Some(pieces) => found.push((number(&name), pieces)),
+            Some(components) => found.push((number(&name), components)),
             None => without_area += 1,
         }
     }
@@ -55,9 +58,9 @@ pub(crate) fn parse_archive(bytes: &[u8]) -> Result<(Vec<Outline>, usize), Strin
     given.sort_unstable();
     given.dedup();
     let keep = given.len() == found.len();
-    let outlines = (1..).zip(found).map(|(n, (id, pieces))| Outline {
+    let outlines = (1..).zip(found).map(|(n, (id, components))| Outline {
         id: id.filter(|_| keep).unwrap_or(n),
-        pieces,
+        components,
     });
     Ok((outlines.collect(), without_area))
 }
@@ -75,9 +78,9 @@ fn number(name: &str) -> Option<u32> {
 /// Rings of a region; `None` for points and lines.
 pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
     if !region.starts_with(MAGIC) || region.len() < HEADER {
-        return Err("is no ImageJ region".into());
+        return Err("is not an ImageJ region".into());
     }
-    let cut = || "the region is cut short".to_owned();
+    let cut = || "the region is truncated".to_owned();
     let short = |at: usize| -> Result<u16, String> {
         let bytes = region.get(at..at + 2).ok_or_else(cut)?;
         Ok(u16::from_be_bytes([bytes[0], bytes[1]]))
@@ -89,7 +92,7 @@ pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
         if v.is_finite() {
             Ok(v)
         } else {
-            Err("a corner is no number".into())
+            Err("a corner is not a number".into())
         }
     };
     let (top, left, bottom, right) = (signed(8)?, signed(10)?, signed(12)?, signed(14)?);
@@ -139,7 +142,7 @@ pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
     Ok(Some(vec![vec![ring]]))
 }
 
-/// Rings of a path of moves, lines and curves; all belong to one piece, filled by the even-odd rule.
+/// Rings of a path of moves, lines and curves; all belong to one component, filled by the even-odd rule.
 fn segments(count: usize, float: &impl Fn(usize) -> Result<f64, String>) -> Result<Vec<Vec<Ring>>, String> {
     let mut rings: Vec<Ring> = Vec::new();
     let mut i = 0;
@@ -190,7 +193,8 @@ fn curve(ring: &mut Ring, control: &[[f64; 2]]) {
     }
 }
 
-/// Writes an archive of one region a label, named `label-N.roi`: a traced polygon, or a path for labels with holes or in pieces.
+/// Writes an archive of one region a label, named `label-N.roi`: a traced polygon, or a path for labels with holes or
+/// in components.
 pub(crate) fn write<W: Write + Seek>(out: W, outlines: &[Outline]) -> io::Result<()> {
     let mut archive = ZipWriter::new(out);
     // The date is the format's first day: files hold no times.
@@ -205,13 +209,14 @@ pub(crate) fn write<W: Write + Seek>(out: W, outlines: &[Outline]) -> io::Result
     Ok(())
 }
 
-/// A number of the header: corners lie within 32,767 pixels, which is checked before anything is written, and `TRACED` regions have fewer than 2¹⁶ corners.
+/// A number of the header: corners lie within 32,767 pixels, which is checked before anything is written, and `TRACED`
+/// regions have fewer than 2¹⁶ corners.
 fn short(v: f64) -> u16 {
     u16::try_from(whole_part(v)).unwrap_or(u16::MAX)
 }
 
 fn region(outline: &Outline) -> Vec<u8> {
-    let corners = || outline.pieces.iter().flatten().flatten();
+    let corners = || outline.components.iter().flatten().flatten();
     let [left, top, right, bottom] = corners().fold([f64::INFINITY, f64::INFINITY, 0.0, 0.0], |b: [f64; 4], c| {
         [b[0].min(c[0]), b[1].min(c[1]), b[2].max(c[0]), b[3].max(c[1])]
     });
@@ -222,21 +227,21 @@ fn region(outline: &Outline) -> Vec<u8> {
     for (at, v) in [(8, top), (10, left), (12, bottom), (14, right)] {
         put(&mut bytes, at, short(v));
     }
-    match outline.pieces.as_slice() {
-        [piece] if piece.len() == 1 && piece[0].len() < 1 << 16 => {
+    match outline.components.as_slice() {
+        [component] if component.len() == 1 && component[0].len() < 1 << 16 => {
             bytes[6] = TRACED;
-            put(&mut bytes, 16, short(piece[0].len() as f64));
+            put(&mut bytes, 16, short(component[0].len() as f64));
             for axis in 0..2 {
                 let from = [left, top][axis];
-                piece[0]
+                component[0]
                     .iter()
                     .for_each(|c| bytes.extend(short(c[axis] - from).to_be_bytes()));
             }
         }
-        pieces => {
+        components => {
             bytes[6] = RECTANGLE;
             let mut path: Vec<f32> = Vec::new();
-            for ring in pieces.iter().flatten() {
+            for ring in components.iter().flatten() {
                 for (i, c) in ring.iter().enumerate() {
                     path.extend([if i == 0 { 0.0 } else { 1.0 }, single(c[0]), single(c[1])]);
                 }
@@ -268,8 +273,8 @@ mod tests {
     #[test]
     fn kinds() {
         let area = |region: &[u8]| {
-            let pieces = parse(region).unwrap()?;
-            Some(Outline { id: 1, pieces }.area())
+            let components = parse(region).unwrap()?;
+            Some(Outline { id: 1, components }.area())
         };
         assert_eq!(area(&header(1, [2, 3, 7, 13], 0)), Some(50.0));
         let oval = area(&header(2, [0, 0, 20, 10], 0)).unwrap();

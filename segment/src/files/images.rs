@@ -1,4 +1,4 @@
-//! Pictures of a segmentation, and the residual that texture is made from.
+//! Images of a segmentation, and the residual from which texture is made.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::labels::profile::Index;
 use crate::outlines::regions::neighbours4;
 use crate::segmentation::Segmentation;
 
-/// Colours of the outlines of categories: Okabe & Ito's, which colour-blind readers can tell apart, black left out.
+/// Colours of the outlines of categories: Okabe & Ito's, which colour-blind readers can distinguish, without black.
 const OUTLINES: [[u8; 3]; 8] = [
     [230, 25, 75],
     [0, 158, 255],
@@ -27,7 +27,8 @@ const OUTLINES: [[u8; 3]; 8] = [
 ];
 
 impl Segmentation {
-    /// The photo with a line one pixel wide just inside every profile, in the colour of its category; what stood out but was left out, as too small or a fleck of texture, is chequered in black.
+    /// The photo with a line one pixel wide just inside every profile, in the colour of its category; what was found
+    /// but left out, as too small or a fleck of texture, is chequered in black.
     #[must_use]
     pub fn overlay(&self) -> RgbImage {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
@@ -45,9 +46,9 @@ impl Segmentation {
         out
     }
 
-    /// The photo's binder, its colour in place of the profiles.
+    /// The photo with every profile replaced by the binder's mean colour.
     #[must_use]
-    pub fn binder_picture(&self) -> RgbImage {
+    pub fn binder_image(&self) -> RgbImage {
         let colour = Rgb(self.binder.colour.map(level));
         let mut out = self.photo.clone();
         for (pixel, _) in out.pixels_mut().zip(&self.labels).filter(|(_, l)| **l != 0) {
@@ -56,7 +57,7 @@ impl Segmentation {
         out
     }
 
-    /// Every profile in its mean colour, the rest in the binder's, rounded to 8 bits.
+    /// Every profile in its mean colour and the rest in the binder's, rounded to 8 bits.
     #[must_use]
     pub fn means(&self) -> RgbImage {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
@@ -70,8 +71,10 @@ impl Segmentation {
         out
     }
 
-    /// What mean colours leave out: photo / 255 − [`Profile::colour`](crate::Profile::colour), and − [`Binder::colour`](crate::Binder::colour) in the binder, axes (y, x, channel). Its mean over every profile and
-    /// over the binder is 0, and mean colour + residual is the photo, both to the rounding of f32; so is [`means`](Self::means) + residual once rounded to 8 bits.
+    /// The residual: photo / 255 − [`Profile::colour`](crate::Profile::colour), and −
+    /// [`Binder::colour`](crate::Binder::colour) in the binder, axes (y, x, channel). Its mean over every profile and
+    /// over the binder is 0, and mean colour + residual is the photo, both to the rounding of f32; so is
+    /// [`means`](Self::means) + residual once rounded to 8 bits.
     ///
     /// # Examples
     ///
@@ -115,9 +118,9 @@ impl Segmentation {
         out
     }
 
-    /// The residual laid over the binder's colour: what the stone looks like with every particle dyed.
+    /// The residual added to the binder's colour: the section as if every particle had that mean colour.
     #[must_use]
-    pub fn residual_picture(&self) -> RgbImage {
+    pub fn residual_image(&self) -> RgbImage {
         let binder = self.binder.colour.map(level);
         let mut out = self.means();
         for (mean, pixel) in out.pixels_mut().zip(self.photo.pixels()) {
@@ -145,10 +148,10 @@ impl Segmentation {
     }
 }
 
-fn write_float_tiff(path: impl AsRef<Path>, picture: ArrayView3<'_, f32>) -> Result<(), SegmentError> {
-    let (height, width, _) = picture.dim();
+fn write_float_tiff(path: impl AsRef<Path>, image: ArrayView3<'_, f32>) -> Result<(), SegmentError> {
+    let (height, width, _) = image.dim();
     let (width, height) = dimensions((height, width));
-    let samples: Vec<f32> = picture.iter().copied().collect();
+    let samples: Vec<f32> = image.iter().copied().collect();
     Ok(write_atomically(path, |out| {
         let write = || -> tiff::TiffResult<()> {
             TiffEncoder::new(out)?.write_image::<colortype::RGB32Float>(width, height, &samples)

@@ -1,4 +1,4 @@
-//! Label maps in files: one number a profile, 0 for the binder; or outlines of the profiles.
+//! Label maps in files: one number per profile, 0 for the binder; or outlines of the profiles.
 
 use std::{
     io::{self, BufReader, Cursor},
@@ -18,7 +18,7 @@ use crate::files::photo::read_bytes;
 use crate::labels::outline::{Outline, fill_outlines, outlines};
 use stereology_metrics::Finding;
 
-/// A label map from a file, and what to know about how it was read.
+/// A label map from a file, and findings on how it was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelFile {
     /// Axes (y, x); 0 is the binder.
@@ -27,7 +27,8 @@ pub struct LabelFile {
     pub findings: Vec<Finding>,
 }
 
-/// Reads a label map for a photo of `size` pixels, (height, width), whatever tool made it; the kind of file is told by its contents.
+/// Reads a label map for a photo of `size` pixels, (height, width), whatever tool made it; the format is recognised by
+/// the contents.
 ///
 /// | file | from | |
 /// |---|---|---|
@@ -36,11 +37,12 @@ pub struct LabelFile {
 /// | .npy | NumPy, Cellpose | whole numbers of any kind, two axes |
 /// | GeoJSON polygons | segmenteverygrain, QGIS | x column, y row, pixel centres at whole numbers; where all y ≤ 0, QGIS's: y up, pixel corners at whole numbers |
 /// | ImageJ regions, .zip or .roi | Fiji's ROI manager, StarDist | polygons, rectangles, ovals, paths; points and lines are left out |
-/// | COCO annotations | labelling tools, networks | polygons and coded masks of the one picture of the photo's size |
+/// | COCO annotations | labelling tools, networks | polygons and run-length masks of the one image of the photo's size |
 ///
 /// # Errors
 ///
-/// The file cannot be opened or is damaged; its numbers are no labels; it holds pickled objects; outlines reach beyond the photo. Label arrays of another size are refused by [`crate::Segmentation::from_labels`].
+/// The file cannot be opened or is damaged; its numbers are not labels; it contains pickled objects; outlines extend
+/// beyond the photo. Label arrays of another size are refused by [`crate::Segmentation::from_labels`].
 ///
 /// # Examples
 ///
@@ -61,11 +63,12 @@ pub fn read_labels_for(path: impl AsRef<Path>, size: (usize, usize)) -> Result<L
     read(path.as_ref(), Some(size))
 }
 
-/// Reads a label map that knows its size, axes (y, x), 0 the binder: TIFF, PNG or .npy. See [`read_labels_for`], which reads outlines too and says what it noticed.
+/// Reads a label map whose file states its size, axes (y, x), 0 the binder: TIFF, PNG or .npy. See [`read_labels_for`],
+/// which reads outlines too and returns findings.
 ///
 /// # Errors
 ///
-/// As [`read_labels_for`]; and for files of outlines, which do not tell the photo's size.
+/// As [`read_labels_for`]; and for files of outlines, which do not state the photo's size.
 ///
 /// # Examples
 ///
@@ -118,20 +121,21 @@ fn read(path: &Path, size: Option<(usize, usize)>) -> Result<LabelFile, SegmentE
     if !zipped && !starts(imagej_roi::MAGIC) && text != Some(&b'{') {
         return Err(refuse("its first bytes are of no known kind of label file; give a TIFF, a PNG, a .npy array, GeoJSON or COCO polygons, or an ImageJ ROI zip".into()));
     }
-    let size = size.ok_or_else(|| refuse("outlines do not tell the photo's size; give the photo as well".into()))?;
+    let size = size
+        .ok_or_else(|| refuse("a file of outlines does not state the photo's size; give the photo as well".into()))?;
     let mut without_area = 0;
     let found = if zipped {
         let (found, lines) = imagej_roi::parse_archive(&bytes).map_err(refuse)?;
         without_area = lines;
         found
     } else if starts(imagej_roi::MAGIC) {
-        let pieces = imagej_roi::parse(&bytes).map_err(refuse)?;
-        let outline = pieces.map(|pieces| Outline { id: 1, pieces });
+        let components = imagej_roi::parse(&bytes).map_err(refuse)?;
+        let outline = components.map(|components| Outline { id: 1, components });
         outline.into_iter().collect()
     } else {
         let start = bytes.iter().position(|b| *b == b'{').unwrap_or(0);
         let json: Value = serde_json::from_reader(BufReader::new(&bytes[start..]))
-            .map_err(|e| refuse(format!("is no JSON ({e})")))?;
+            .map_err(|e| refuse(format!("is not JSON ({e})")))?;
         if json.get("annotations").is_some() {
             coco::parse(&json, size).map_err(refuse)?
         } else {
@@ -141,14 +145,14 @@ fn read(path: &Path, size: Option<(usize, usize)>) -> Result<LabelFile, SegmentE
     drawn(&found, without_area, size).map_err(refuse)
 }
 
-/// Outlines as a map, with what was lost on the way.
+/// Label map of outlines, with findings on overlaps and losses.
 fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)) -> Result<LabelFile, String> {
-    let corners = || found.iter().flat_map(|o| o.pieces.iter().flatten().flatten());
+    let corners = || found.iter().flat_map(|o| o.components.iter().flatten().flatten());
     let beyond = corners()
         .find(|c| !(c[0] >= -2.0 && c[1] >= -2.0 && c[0] <= width as f64 + 2.0 && c[1] <= height as f64 + 2.0));
     if let Some([x, y]) = beyond {
         return Err(format!(
-            "an outline reaches to x = {x}, y = {y}, but the photo is {width}x{height} pixels; export outlines in pixels of this photo, not turned, cropped or in map units"
+            "an outline extends to x = {x}, y = {y}, but the photo is {width}x{height} pixels; export outlines in pixels of this photo, not rotated, cropped or in map units"
         ));
     }
     let (labels, overlap) = fill_outlines(found, (height, width));
@@ -156,7 +160,7 @@ fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)
     if overlap > 0 {
         findings.push(Finding::new(
             "overlapping-labels",
-            format!("{overlap} pixels lie in more than one outline; they were given to the smaller one"),
+            format!("{overlap} pixels lie in more than one outline; they were assigned to the smaller one"),
         ));
     }
     let drawn = crate::labels::profile::distinct(&labels).len();
@@ -167,12 +171,13 @@ fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)
     Ok(LabelFile { labels, findings })
 }
 
-/// Writes a label map in the kind of file its ending says: .tif or .tiff (u16 where the largest label fits, else u32), .png (u16), .npy (u32), .geojson, .zip (ImageJ regions), .json (COCO); the file appears
-/// whole or not at all.
+/// Writes a label map in the format of the file name's extension: .tif or .tiff (u16 where the largest label fits, else
+/// u32), .png (u16), .npy (u32), .geojson, .zip (ImageJ regions), .json (COCO); the file appears whole or not at all.
 ///
 /// # Errors
 ///
-/// The file cannot be written; another ending; a label beyond 65,535 for a PNG, or a map beyond 32,767 pixels for ImageJ's regions.
+/// The file cannot be written; another extension; a label beyond 65,535 for a PNG, or a map beyond 32,767 pixels for
+/// ImageJ's regions.
 ///
 /// # Examples
 ///
@@ -191,14 +196,14 @@ pub fn write_labels(path: impl AsRef<Path>, labels: ArrayView2<'_, u32>) -> Resu
         "tif" | "tiff" => write_atomically(path, |out| write_tiff(out, labels).map_err(io::Error::other))?,
         "png" => {
             let Some(samples) = narrow(labels) else {
-                return refuse("a PNG holds labels up to 65,535, and these go beyond; write a TIFF or a .npy");
+                return refuse("a PNG stores labels up to 65,535, and there are larger ones; write a TIFF or a .npy");
             };
             let (w, h) = dimensions((height, width));
-            let Some(picture) = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(w, h, samples) else {
+            let Some(image) = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(w, h, samples) else {
                 return refuse("the map is too large for a PNG");
             };
             let mut bytes = Cursor::new(Vec::new());
-            let encoded = picture.write_to(&mut bytes, image::ImageFormat::Png);
+            let encoded = image.write_to(&mut bytes, image::ImageFormat::Png);
             write_atomically(path, |out| {
                 encoded.map_err(io::Error::other)?;
                 io::Write::write_all(out, bytes.get_ref())
@@ -207,9 +212,11 @@ pub fn write_labels(path: impl AsRef<Path>, labels: ArrayView2<'_, u32>) -> Resu
         "npy" => write_atomically(path, |out| write_npy(out, labels))?,
         "geojson" => write_atomically(path, |out| geojson::write(out, &rings()))?,
         "json" => write_atomically(path, |out| coco::write(out, &rings(), (height, width)))?,
-        "zip" if height.max(width) > 32_767 => return refuse("ImageJ's regions reach to 32,767 pixels; write a TIFF"),
+        "zip" if height.max(width) > 32_767 => {
+            return refuse("ImageJ's regions extend to at most 32,767 pixels; write a TIFF");
+        }
         "zip" => write_atomically(path, |out| imagej_roi::write(out, &rings()))?,
-        _ => return refuse("the ending is none of .tif, .png, .npy, .geojson, .json (COCO), .zip (ImageJ regions)"),
+        _ => return refuse("the extension is none of .tif, .png, .npy, .geojson, .json (COCO), .zip (ImageJ regions)"),
     }
     Ok(())
 }

@@ -19,12 +19,12 @@ use crate::conversions::{index, whole_part};
 
 /// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
 const LARGEST_MAP: usize = 1_600_000_000;
-/// Advice for files whose samples are no labels.
+/// Advice for files whose samples are not labels.
 const ADVICE: &str = "give one channel of whole numbers, 0 for the binder";
 
 /// Labels of a TIFF as stored: numbers of 1 to 64 bits, floats if whole, never inverted for display.
 pub(crate) fn parse_tiff(bytes: &[u8]) -> Result<(Array2<u32>, Vec<Finding>), String> {
-    // A header may claim any size; no map of ours is larger than this.
+    // A header may state any size; larger maps are not supported.
     let mut limits = Limits::default();
     limits.decoding_buffer_size = LARGEST_MAP;
     let text = |e: tiff::TiffError| e.to_string();
@@ -58,7 +58,7 @@ pub(crate) fn parse_tiff(bytes: &[u8]) -> Result<(Array2<u32>, Vec<Finding>), St
         DecodingResult::I64(v) => v.into_iter().map(|l| whole(l as f64)).collect(),
         DecodingResult::F32(v) => v.into_iter().map(|l| whole(f64::from(l))).collect(),
         DecodingResult::F64(v) => v.into_iter().map(whole).collect(),
-        _ => Err(format!("the samples are of an unusual kind; {ADVICE}")),
+        _ => Err(format!("the samples are of an unsupported type; {ADVICE}")),
     };
     let mut pages = 1;
     while decoder.more_images() && decoder.next_image().is_ok() {
@@ -67,7 +67,9 @@ pub(crate) fn parse_tiff(bytes: &[u8]) -> Result<(Array2<u32>, Vec<Finding>), St
     let findings = (pages > 1).then(|| {
         Finding::new(
             "first-page",
-            format!("the TIFF has {pages} pages; the first one was taken: save the page that belongs to the photo alone if it is another"),
+            format!(
+                "the TIFF has {pages} pages; the first one was read: if another one belongs to the photo, save it alone"
+            ),
         )
     });
     Ok((shaped((rows, columns), samples?)?, findings.into_iter().collect()))
@@ -187,7 +189,7 @@ fn whole(value: f64) -> Result<u32, String> {
     }
     if value.fract() != 0.0 || value > f64::from(u32::MAX) {
         return Err(format!(
-            "the label {value} is no whole number of at most 32 bits; {ADVICE}"
+            "the label {value} is not a whole number of at most 32 bits; {ADVICE}"
         ));
     }
     Ok(index(whole_part(value)))
@@ -243,7 +245,7 @@ pub(crate) fn write_npy(out: &mut dyn Write, labels: ArrayView2<'_, u32>) -> std
     out.write_all(&samples)
 }
 
-/// Width and height of an array (y, x); a picture in memory has fewer than 2³² rows and columns.
+/// Width and height of an array (y, x); an image in memory has fewer than 2³² rows and columns.
 pub(crate) fn dimensions((height, width): (usize, usize)) -> (u32, u32) {
     (
         u32::try_from(width).unwrap_or(u32::MAX),

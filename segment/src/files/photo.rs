@@ -1,4 +1,4 @@
-//! Photographs in files, and as arrays.
+//! Photographs from files, and as arrays.
 
 use std::{io::Cursor, path::Path};
 
@@ -8,7 +8,7 @@ use ndarray::Array2;
 use crate::error::SegmentError;
 use stereology_metrics::Finding;
 
-/// A photograph from a file, and what to know about how it was read.
+/// A photograph from a file, and findings on how it was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotoFile {
     /// 8-bit sRGB, up is up.
@@ -17,12 +17,14 @@ pub struct PhotoFile {
     pub findings: Vec<Finding>,
 }
 
-/// Reads a PNG, JPEG or TIFF photograph as 8-bit sRGB: 16-bit samples are rounded, grey becomes three equal channels, palettes are looked up, transparency is laid over white, and the camera's EXIF
-/// orientation is applied, so that up is up.
+/// Reads a PNG, JPEG or TIFF photograph as 8-bit sRGB: 16-bit samples are rounded, grey becomes three equal channels,
+/// palettes are looked up, transparency is composited over white, and the camera's EXIF orientation is applied, so that
+/// up is up.
 ///
 /// # Errors
 ///
-/// [`SegmentError::Open`], [`SegmentError::EmptyFile`], or [`SegmentError::Decode`] for text, unknown formats and files cut short.
+/// [`SegmentError::Open`], [`SegmentError::EmptyFile`], or [`SegmentError::Decode`] for text, unknown formats and
+/// truncated files.
 ///
 /// # Examples
 ///
@@ -37,7 +39,7 @@ pub fn read_photo(path: impl AsRef<Path>) -> Result<RgbImage, SegmentError> {
     Ok(read_photo_up_to(path, u64::MAX)?.photo)
 }
 
-/// [`read_photo`], refused before it is decoded if it has more than `most` pixels, with what was noticed.
+/// [`read_photo`] with findings; files of more than `most` pixels are refused before they are decoded.
 ///
 /// # Errors
 ///
@@ -65,10 +67,10 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
         .with_guessed_format()
         .map_err(|e| refuse(e.to_string()))?;
     if reader.format().is_none() {
-        return Err(refuse("its first bytes are of no known picture format".into()));
+        return Err(refuse("its first bytes are of no known image format".into()));
     }
     if reader.format() == Some(ImageFormat::Jpeg) && !has_end(&bytes) {
-        return Err(refuse("the file is cut short: the JPEG's end is missing".into()));
+        return Err(refuse("the file is truncated: the JPEG's end is missing".into()));
     }
     // The number of pixels is limited by `most`, before anything is decoded.
     reader.no_limits();
@@ -79,9 +81,9 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
         return Err(too_large([width, height], most.min(MOST_PIXELS)));
     }
     let orientation = decoder.orientation().map_err(|e| refuse(e.to_string()))?;
-    let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| refuse(e.to_string()))?;
-    picture.apply_orientation(orientation);
-    let through = match &picture {
+    let mut image = DynamicImage::from_decoder(decoder).map_err(|e| refuse(e.to_string()))?;
+    image.apply_orientation(orientation);
+    let through = match &image {
         p if !p.color().has_alpha() => 0,
         p => p.to_rgba8().pixels().filter(|p| p[3] < 255).count(),
     };
@@ -89,14 +91,14 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
         Finding::new(
             "alpha-over-white",
             format!(
-                "{:.1} % of the photo's pixels are transparent and were laid over white; save it without transparency if they are not meant to be white",
+                "{:.1} % of the photo's pixels are transparent and were composited over white; save it without transparency if they are not meant to be white",
                 100.0 * through as f64 / pixels as f64
             ),
         )
     };
     Ok(PhotoFile {
         findings: (through > 0).then(finding).into_iter().collect(),
-        photo: over_white(picture),
+        photo: over_white(image),
     })
 }
 
@@ -119,8 +121,8 @@ pub fn encoded_image(photo: &RgbImage) -> Array2<[f32; 3]> {
 
 /// Pixels that labels and indices of 32 bits can number.
 pub(crate) const MOST_PIXELS: u64 = 1 << 31;
-/// Memory that reading and segmenting take, bytes a pixel.
-const BYTES_A_PIXEL: f64 = 100.0;
+/// Memory that reading and segmenting take, bytes per pixel.
+const BYTES_PER_PIXEL: f64 = 100.0;
 
 /// The refusal of a photo of more than `most` pixels.
 pub(crate) fn too_large([width, height]: [u32; 2], most: u64) -> SegmentError {
@@ -128,17 +130,17 @@ pub(crate) fn too_large([width, height]: [u32; 2], most: u64) -> SegmentError {
         width,
         height,
         most,
-        gigabytes: (f64::from(width) * f64::from(height) * BYTES_A_PIXEL / 1e9).ceil(),
+        gigabytes: (f64::from(width) * f64::from(height) * BYTES_PER_PIXEL / 1e9).ceil(),
     }
 }
 
-/// Whether a JPEG's last scan is followed by the end marker; decoders fill what is missing with grey.
+/// Whether a JPEG's last scan is followed by the end marker; decoders fill missing pixels with grey.
 fn has_end(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|w| w == [0xff, marker]);
     last(0xd9) > last(0xda)
 }
 
-/// All bytes of a file that has some.
+/// All bytes of a file that is not empty.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, SegmentError> {
     let bytes = std::fs::read(path).map_err(|source| SegmentError::Open {
         path: path.into(),
@@ -150,14 +152,14 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, SegmentError> {
     Ok(bytes)
 }
 
-/// 8-bit sRGB; what is transparent shows white.
-fn over_white(picture: DynamicImage) -> RgbImage {
-    if !picture.color().has_alpha() {
-        return picture.into_rgb8();
+/// 8-bit sRGB over a white background.
+fn over_white(image: DynamicImage) -> RgbImage {
+    if !image.color().has_alpha() {
+        return image.into_rgb8();
     }
-    let picture = picture.into_rgba8();
-    RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
-        let [r, g, b, a] = picture.get_pixel(x, y).0.map(u32::from);
+    let image = image.into_rgba8();
+    RgbImage::from_fn(image.width(), image.height(), |x, y| {
+        let [r, g, b, a] = image.get_pixel(x, y).0.map(u32::from);
         // Rounded; at most 255 because the weights sum to 255.
         image::Rgb([r, g, b].map(|c| u8::try_from((c * a + 255 * (255 - a) + 127) / 255).unwrap_or(255)))
     })

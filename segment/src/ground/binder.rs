@@ -1,4 +1,4 @@
-//! The binder: the colour everything else is told apart from, under light that is not even.
+//! The binder: its colour under uneven light and its scatter, from which every particle differs.
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
@@ -9,7 +9,8 @@ use crate::ground::light::{
     Sample, Surface, TERMS, colour_at, fit_surface, identity, inverse_factor, place, sample, scatter,
 };
 
-/// Robust fit of the binder's colour: a quadratic surface of light in each channel of encoded values, and the scatter around it.
+/// Robust fit of the binder's colour: a quadratic surface of light in each channel of encoded values, and the scatter
+/// around it.
 ///
 /// # Formula
 ///
@@ -20,14 +21,15 @@ use crate::ground::light::{
 ///
 /// # References
 ///
-/// Jagnow, Dorsey & Rushmeier 2004, section 4.2 segments by hand; the trimmed covariance is that of Rousseeuw's reweighting (1987).
+/// Rousseeuw & Leroy 1987 for the trimmed, reweighted covariance. Jagnow, Dorsey & Rushmeier 2004, section 4.2, segment
+/// by hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BinderModel {
     surface: Surface,
     /// Lower triangular W with Σ⁻¹ = WᵀW.
     whitening: [[f64; 3]; 3],
     size: (usize, usize),
-    share: f64,
+    fraction: f64,
     spread: f64,
 }
 
@@ -35,17 +37,19 @@ pub struct BinderModel {
 pub(crate) const GUESSES: usize = 8;
 /// Distance beyond which a pixel does not count as binder while fitting.
 const GATE: f64 = 3.0;
-/// Scatter that is small for a photo: at this, twice the pixels outweigh twice the scatter.
+/// Scatter that is small for a photo, sRGB / 255: it is added to the scatter in the score of a candidate, so that
+/// scatter below it hardly matters.
 const WIDE: f64 = 3.0 / 255.0;
-/// Standard deviation around a guess to start from.
+/// Initial standard deviation around a starting colour, sRGB / 255.
 const FIRST_DEVIATION: f64 = 8.0 / 255.0;
 
 impl BinderModel {
-    /// Finds the binder: k-means of the colours gives eight guesses, each is fitted robustly, and the one with most pixels for its scatter is taken.
+    /// Finds the binder: k-means of the colours gives eight starting colours, a model is fitted robustly from each, and
+    /// the one with the most pixels for its scatter is returned.
     ///
     /// # Complexity
     ///
-    /// A sample of 16,000 pixels is looked at, whatever the size of the photo.
+    /// A sample of about 16,000 pixels is used, whatever the size of the photo.
     ///
     /// # Examples
     ///
@@ -57,28 +61,28 @@ impl BinderModel {
     ///     let level = if (20..30).contains(&x) && (20..30).contains(&y) { 250 } else { 100 + x as u8 / 2 + (x * 7 + y * 5) as u8 % 3 };
     ///     image::Rgb([level; 3])
     /// });
-    /// let picture = encoded_image(&photo);
-    /// let binder = BinderModel::fit(&picture, 0);
-    /// let distance = binder.distance(&picture);
+    /// let image = encoded_image(&photo);
+    /// let binder = BinderModel::fit(&image, 0);
+    /// let distance = binder.distance(&image);
     /// assert!(distance[[25, 25]] > 20.0 && distance[[50, 5]] < 4.0 && distance[[50, 60]] < 4.0);
     /// ```
     #[must_use]
-    pub fn fit(picture: &Array2<[f32; 3]>, seed: u64) -> Self {
-        let samples = sample(picture);
+    pub fn fit(image: &Array2<[f32; 3]>, seed: u64) -> Self {
+        let samples = sample(image);
         let colours: Vec<[f64; 3]> = samples.iter().map(|s| s.colour).collect();
         let guesses = kmeans(&colours, GUESSES, seed).centres;
         let fits: Vec<(f64, Self)> = guesses
             .par_iter()
             .map(|guess| {
-                let model = Self::from_guess(&samples, *guess, picture.dim());
+                let model = Self::from_guess(&samples, *guess, image.dim());
                 (model.score(), model)
             })
             .collect();
         let mut best = Self {
             surface: [[0.0; TERMS]; 3],
             whitening: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            size: picture.dim(),
-            share: 0.0,
+            size: image.dim(),
+            fraction: 0.0,
             spread: f64::INFINITY,
         };
         let mut best_score = f64::NEG_INFINITY;
@@ -90,8 +94,8 @@ impl BinderModel {
         best
     }
 
-    /// Fits light and scatter to pixels near a given colour, sRGB / 255, and no further: for a binder that is known, or whose colours go over into those of the particles without a gap, where
-    /// [`fit`](Self::fit) would spread over both.
+    /// Fits light and scatter to pixels near a given colour, sRGB / 255, only: for a binder whose colour is known, or
+    /// whose colours overlap with those of the particles, where [`fit`](Self::fit) would cover both.
     ///
     /// # Examples
     ///
@@ -107,13 +111,13 @@ impl BinderModel {
     /// assert!((binder.light(50, 50)[0] * 255.0 - 100.0).abs() < 5.0 && binder.spread() < 8.0 / 255.0);
     /// ```
     #[must_use]
-    pub fn fit_near(picture: &Array2<[f32; 3]>, colour: [f32; 3]) -> Self {
-        let samples = sample(picture);
-        let mut model = Self::flat(colour.map(f64::from), FIRST_DEVIATION, picture.dim(), 0.0);
+    pub fn fit_near(image: &Array2<[f32; 3]>, colour: [f32; 3]) -> Self {
+        let samples = sample(image);
+        let mut model = Self::flat(colour.map(f64::from), FIRST_DEVIATION, image.dim(), 0.0);
         let fixed = model.whitening;
         for terms in [1, 3, 3, TERMS, TERMS, TERMS] {
             model.whitening = fixed;
-            // The given colour is near the middle of the photo's: it may shift by what light does, not to another heap.
+            // The given colour is near the binder's mean: it may shift with the light, but not to another mode.
             if !model.fit_round(&samples, 2.0, terms) {
                 break;
             }
@@ -121,7 +125,8 @@ impl BinderModel {
         model
     }
 
-    /// This binder's light and scatter fitted again to a picture of the same scene, such as one at another scale; pixels that are not numbers are left out.
+    /// Fits this binder's light and scatter to another image of the same scene, such as one at another scale; pixels
+    /// that are not numbers are left out.
     ///
     /// # Examples
     ///
@@ -130,16 +135,16 @@ impl BinderModel {
     /// use stereology_segment::{BinderModel, encoded_image};
     ///
     /// let photo = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([90 + ((x * 7919 ^ y * 104_729) % 21) as u8; 3]));
-    /// let picture = encoded_image(&photo);
-    /// let binder = BinderModel::fit(&picture, 0);
-    /// assert!(binder.refit(&gaussian_filter_rgb(picture.view(), 2.0)).spread() < 0.5 * binder.spread());
+    /// let image = encoded_image(&photo);
+    /// let binder = BinderModel::fit(&image, 0);
+    /// assert!(binder.refit(&gaussian_filter_rgb(image.view(), 2.0)).spread() < 0.5 * binder.spread());
     /// ```
     #[must_use]
-    pub fn refit(&self, picture: &Array2<[f32; 3]>) -> Self {
-        let mut samples = sample(picture);
+    pub fn refit(&self, image: &Array2<[f32; 3]>) -> Self {
+        let mut samples = sample(image);
         samples.retain(|s| s.colour.iter().all(|c| c.is_finite()));
         let mut model = Self {
-            size: picture.dim(),
+            size: image.dim(),
             ..self.clone()
         };
         for _ in 0..4 {
@@ -148,8 +153,9 @@ impl BinderModel {
         model
     }
 
-    /// The same binder with at least `deviation`, sRGB / 255, of scatter in every direction of colour. Photos keep hue at half the resolution of lightness, and binders scatter little in hue: outlines drawn with
-    /// the true scatter would follow hue alone.
+    /// The same binder with a scatter of at least `deviation`, sRGB / 255, in every direction of colour. JPEG stores
+    /// hue at half the resolution of lightness, and binders scatter little in hue: outlines drawn with the true scatter
+    /// would follow hue alone.
     #[must_use]
     pub fn blunted(&self, deviation: f64) -> Self {
         let [[a, ..], [b, c, _], [d, e, f]] = self.whitening;
@@ -179,25 +185,26 @@ impl BinderModel {
             return false;
         }
         self.surface = fit_surface(&inside, terms);
-        self.share = inside.len() as f64 / samples.len() as f64;
+        self.fraction = inside.len() as f64 / samples.len() as f64;
         (self.whitening, self.spread) = scatter(&self.surface, &inside);
         true
     }
 
     /// A binder of one colour and the same scatter in each channel.
-    pub(crate) fn flat(colour: [f64; 3], deviation: f64, size: (usize, usize), share: f64) -> Self {
+    pub(crate) fn flat(colour: [f64; 3], deviation: f64, size: (usize, usize), fraction: f64) -> Self {
         let surface = colour.map(|c| [c, 0.0, 0.0, 0.0, 0.0, 0.0]);
         Self {
             surface,
             whitening: identity(1.0 / deviation),
             size,
-            share,
+            fraction,
             spread: deviation,
         }
     }
 
     fn from_guess(samples: &[Sample], guess: [f64; 3], size: (usize, usize)) -> Self {
-        // Start wide around the guess; each round fits what the last round calls binder.
+        // Starts with a wide gate around the starting colour; each iteration fits the pixels that the previous one
+        // accepts.
         let mut model = Self {
             spread: f64::INFINITY,
             ..Self::flat(guess, FIRST_DEVIATION, size, 0.0)
@@ -217,7 +224,7 @@ impl BinderModel {
         self.at(self.place(x, y)).map(single)
     }
 
-    /// [`light`](Self::light) along a row: what depends on the row alone is worked out once.
+    /// [`light`](Self::light) along a row: what depends on the row alone is computed once.
     fn light_along(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
         let [_, v] = self.place(0, y);
         let row = self
@@ -230,17 +237,17 @@ impl BinderModel {
         }
     }
 
-    /// Pixels for their scatter: a wide cloud holds many pixels of anything.
+    /// Fraction of pixels divided by scatter: a wide cloud of colours contains many pixels of any material.
     fn score(&self) -> f64 {
-        self.share / (self.spread() + WIDE)
+        self.fraction / (self.spread() + WIDE)
     }
 
-    /// The picture under even light: what the surface adds to its mean over the photo's width and height is taken away.
+    /// The image under even light: the difference between the surface and its mean over the photo is subtracted.
     #[must_use]
-    pub fn even_light(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
+    pub fn even_light(&self, image: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
         // Means of u² and v² over −1..1 are a third, of the other terms zero.
         let mean = self.surface.map(|c| single(c[0] + (c[3] + c[5]) / 3.0));
-        let mut out = picture.clone();
+        let mut out = image.clone();
         out.axis_iter_mut(Axis(0))
             .into_par_iter()
             .enumerate()
@@ -254,22 +261,24 @@ impl BinderModel {
         out
     }
 
-    /// Share of the photo's pixels that are binder, 0 to 1.
+    /// Fraction of the photo's pixels that are binder.
     #[must_use]
-    pub fn share(&self) -> f64 {
-        self.share
+    pub fn covered(&self) -> f64 {
+        self.fraction
     }
 
-    /// Standard deviation of the binder's colour around its surface, the root mean square of the three channels, sRGB / 255.
+    /// Standard deviation of the binder's colour around its surface, the root mean square of the three channels, sRGB /
+    /// 255.
     #[must_use]
     pub fn spread(&self) -> f64 {
         self.spread
     }
 
-    /// Difference of every pixel to the binder there, in units of the binder's scatter: a vector whose length is the robust distance z.
+    /// Difference of every pixel from the binder at that place, scaled by the binder's scatter: a vector whose length
+    /// is the robust distance z.
     #[must_use]
-    pub fn deviation(&self, picture: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
-        let mut out = picture.clone();
+    pub fn deviation(&self, image: &Array2<[f32; 3]>) -> Array2<[f32; 3]> {
+        let mut out = image.clone();
         let w = self.whitening.map(|row| row.map(single));
         out.axis_iter_mut(Axis(0))
             .into_par_iter()
@@ -299,8 +308,8 @@ impl BinderModel {
     ///
     /// See [`BinderModel::fit`].
     #[must_use]
-    pub fn distance(&self, picture: &Array2<[f32; 3]>) -> Array2<f32> {
-        self.deviation(picture).mapv(length)
+    pub fn distance(&self, image: &Array2<[f32; 3]>) -> Array2<f32> {
+        self.deviation(image).mapv(length)
     }
 
     pub(crate) fn place(&self, x: usize, y: usize) -> [f64; 2] {

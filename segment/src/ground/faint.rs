@@ -1,4 +1,4 @@
-//! Faint particles: what differs from the binder by less than its texture, seen where texture is averaged away.
+//! Faint particles, which differ from the binder by less than its texture: found where the texture is averaged out.
 
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
@@ -8,19 +8,21 @@ use crate::ground::binder::{BinderModel, length};
 use crate::outlines::half_contrast::half_contrast;
 use crate::outlines::regions::{hysteresis, neighbours8, open};
 
-/// Pixels in the side of a cell of the coarse picture.
+/// Side of a cell of the coarse image, pixels.
 const CELL: usize = 2;
 /// Standard deviation of the coarse smoothing, cells.
 const SIGMA: f32 = 1.5;
-/// Least share of the smoothing's weight that must lie in the binder's part of the picture.
+/// Least fraction of the filter's weight that must lie on binder.
 const KNOWN: f32 = 0.25;
-/// Least area of a faint region, pixels: about that of the smoothing.
+/// Least area of a faint region, pixels: about that of the filter.
 const LEAST: usize = 60;
 
-/// Regions outside a mask that stand out from the binder only over many pixels, and how far: their distance to the binder at that scale, 0 elsewhere.
+/// Regions outside a mask that differ from the binder only on average over many pixels: their distance from the binder
+/// at that scale, 0 elsewhere.
 ///
-/// The picture is averaged over some six pixels, those of the mask and its rim left out, so that neither texture nor the colours of particles already found cover what is faint; the binder's light and scatter
-/// are fitted again at that scale, and the thresholds are the same number of standard deviations.
+/// The image is averaged over about six pixels, without those of the mask and its rim, so that neither texture nor the
+/// colours of particles already found hide faint ones. The binder's light and scatter are fitted again at that scale,
+/// and the thresholds are standard deviations there.
 ///
 /// # Complexity
 ///
@@ -38,23 +40,23 @@ const LEAST: usize = 60;
 ///     let texture = (x * 7919 ^ (y * 104_729 + x * y * 31)) % 25;
 ///     image::Rgb([(if inside { 116 } else { 100 }) + texture as u8; 3])
 /// });
-/// let picture = encoded_image(&photo);
-/// let binder = BinderModel::fit(&picture, 0);
-/// assert!(binder.distance(&picture)[[60, 60]] < 5.0);
-/// let distance = faint_regions(&picture, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0]);
+/// let image = encoded_image(&photo);
+/// let binder = BinderModel::fit(&image, 0);
+/// assert!(binder.distance(&image)[[60, 60]] < 5.0);
+/// let distance = faint_regions(&image, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0]);
 /// let found = distance.iter().filter(|z| **z > 0.0).count();
 /// assert!(distance[[60, 60]] > 9.0 && (1500..1700).contains(&found), "{found}");
 /// ```
 #[must_use]
 pub fn faint_regions(
-    picture: &Array2<[f32; 3]>,
+    image: &Array2<[f32; 3]>,
     binder: &BinderModel,
     mask: &Array2<bool>,
     [low, high]: [f32; 2],
 ) -> Array2<f32> {
-    let dim = picture.dim();
+    let dim = image.dim();
     let none = Array2::zeros(dim);
-    let coarse = averaged(picture, binder, mask);
+    let coarse = averaged(image, binder, mask);
     let known: Array2<[f32; 3]> = coarse.mapv(|c| c.unwrap_or([f32::NAN; 3]));
     let model = binder.refit(&known);
     let deviation = model
@@ -77,11 +79,11 @@ pub fn faint_regions(
     }
     faint.zip_mut_with(mask, |f, m| *f &= !m);
     open(&mut faint);
-    let (pieces, count) = connected_components(faint.view(), |f| f);
+    let (components, count) = connected_components(faint.view(), |f| f);
     let mut areas = vec![0_usize; count as usize + 1];
-    pieces.iter().for_each(|&p| areas[p as usize] += 1);
+    components.iter().for_each(|&p| areas[p as usize] += 1);
     Array2::from_shape_fn(dim, |p| {
-        if faint[p] && areas[pieces[p] as usize] >= LEAST {
+        if faint[p] && areas[components[p] as usize] >= LEAST {
             length(fine[p])
         } else {
             0.0
@@ -89,9 +91,10 @@ pub fn faint_regions(
     })
 }
 
-/// Mean colours of cells and their surroundings, without the mask and its rim; `None` where hardly anything else is near. Light is taken out before and put back after, so that its slope survives lopsided means.
-fn averaged(picture: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool>) -> Array2<Option<[f32; 3]>> {
-    let (height, width) = picture.dim();
+/// Mean colours of cells and their surroundings, without the mask and its rim; not a number where there is hardly
+/// anything else. The light is subtracted before and added after, so that one-sided means keep its slope.
+fn averaged(image: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool>) -> Array2<Option<[f32; 3]>> {
+    let (height, width) = image.dim();
     let cells = (height.div_ceil(CELL), width.div_ceil(CELL));
     let square = |[j, i]: [usize; 2]| {
         let rows = j * CELL..((j + 1) * CELL).min(height);
@@ -107,7 +110,7 @@ fn averaged(picture: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool
         let light = binder.light(i * CELL, j * CELL);
         let mut count = 0.0;
         for p in square([j, i]) {
-            (0..3).for_each(|c| sum[c] += picture[p][c] - light[c]);
+            (0..3).for_each(|c| sum[c] += image[p][c] - light[c]);
             count += 1.0;
         }
         sum.iter_mut().for_each(|s| *s /= count);
@@ -121,7 +124,7 @@ fn averaged(picture: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool
     })
 }
 
-/// Field of cells at every pixel, linear between the cells' centres.
+/// A field of cells at every pixel, by linear interpolation between the cells' centres.
 fn enlarged(field: &Array2<[f32; 3]>, dim: (usize, usize)) -> Array2<[f32; 3]> {
     let (rows, columns) = field.dim();
     let between = |i: usize, n: usize| {

@@ -1,9 +1,9 @@
-//! k-means: colours in groups.
+//! k-means clustering of colours.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Groups of points by their nearest centre.
+/// Points grouped by their nearest centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clusters {
     /// Centre of each group: the mean of its points.
@@ -14,15 +14,16 @@ pub struct Clusters {
     pub inertia: f64,
 }
 
-/// Rounds of assignment after which the centres have long settled.
+/// Most iterations: the centres settle long before.
 const ROUNDS: usize = 60;
 
-/// Lloyd's k-means from a k-means++ start (Arthur & Vassilvitskii 2007): the best of four starts, the same for the same seed. Groups are numbered by decreasing number of points. Fewer than `k` groups come
-/// back where there are fewer distinct points.
+/// Lloyd's k-means from a k-means++ start (Arthur & Vassilvitskii 2007): the best of four starts, the same for the same
+/// seed. Groups are numbered by decreasing number of points. There are fewer than `k` groups if there are fewer
+/// distinct points.
 ///
 /// # Complexity
 ///
-/// Points × k × rounds (at most 60).
+/// Points × k × iterations (at most 60).
 ///
 /// # Examples
 ///
@@ -154,7 +155,8 @@ pub(crate) fn squared_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)
 }
 
-/// Mean silhouette of groups, from −1 to 1: how much nearer points are to their own group than to the next one (Rousseeuw 1987). 0 for a single group. At most 400 points, evenly spread, are looked at.
+/// Mean silhouette of groups, from −1 to 1: how much nearer points are to their own group than to the next one
+/// (Rousseeuw 1987). 0 for a single group. At most 400 points, evenly spaced in the list, are used.
 ///
 /// # Examples
 ///

@@ -1,4 +1,5 @@
-//! Light and scatter of a binder: the quadratic surface its colour follows across the photo, and how far its pixels stray from it.
+//! Light and scatter of a binder: the quadratic surface that its colour follows across the photo, and the covariance of
+//! its pixels around it.
 
 use ndarray::Array2;
 
@@ -7,15 +8,15 @@ use crate::conversions::whole_part;
 /// Terms of a quadratic surface.
 pub(crate) const TERMS: usize = 6;
 
-/// Pixels in the sample, at least, where the photo has as many.
+/// Least number of pixels in the sample, where the photo has as many.
 const SAMPLE: usize = 16_000;
-/// Least standard deviation: half a grey level of an 8-bit picture.
+/// Least standard deviation: half a grey level of an 8-bit image.
 const LEAST_DEVIATION: f64 = 0.5 / 255.0;
 
 /// Coefficients of the surface, for each channel.
 pub(crate) type Surface = [[f64; TERMS]; 3];
 
-/// A pixel of the sample: place in −1..1 and colour.
+/// A pixel of the sample: position in −1..1 and colour.
 #[derive(Clone, Copy)]
 pub(crate) struct Sample {
     pub(crate) place: [f64; 2],
@@ -23,15 +24,15 @@ pub(crate) struct Sample {
 }
 
 /// Pixels on a square lattice.
-pub(crate) fn sample(picture: &Array2<[f32; 3]>) -> Vec<Sample> {
-    let (height, width) = picture.dim();
+pub(crate) fn sample(image: &Array2<[f32; 3]>) -> Vec<Sample> {
+    let (height, width) = image.dim();
     let step = whole_part(((height * width / SAMPLE) as f64).sqrt()).max(1);
     let at = |n: usize| (step / 2..n).step_by(step);
     at(height)
         .flat_map(|y| at(width).map(move |x| (x, y)))
         .map(|(x, y)| Sample {
             place: place(x, y, (height, width)),
-            colour: picture[[y, x]].map(f64::from),
+            colour: image[[y, x]].map(f64::from),
         })
         .collect()
 }
@@ -51,7 +52,8 @@ fn basis([u, v]: [f64; 2]) -> [f64; TERMS] {
     [1.0, u, v, u * u, u * v, v * v]
 }
 
-/// Least squares with a little shrinkage of slopes and curvatures, so that a binder seen in one corner is not extrapolated wildly.
+/// Least squares with slight shrinkage of slopes and curvatures, so that a binder visible in one corner only is not
+/// extrapolated wildly.
 pub(crate) fn fit_surface(inside: &[&Sample], terms: usize) -> Surface {
     let mut normal = [[0.0; TERMS]; TERMS];
     let mut right = [[0.0; TERMS]; 3];
@@ -93,8 +95,9 @@ pub(crate) fn fit_surface(inside: &[&Sample], terms: usize) -> Surface {
     })
 }
 
-/// Inverse Cholesky factor of the covariance around the surface, and its standard deviation. The covariance gives the shape, the median distance the scale, so that particles of a colour near the binder's do
-/// not widen it; it is kept above the quantisation.
+/// Inverse Cholesky factor of the covariance around the surface, and its standard deviation. The covariance gives the
+/// shape and the median distance the scale, so that particles of a colour near the binder's do not widen it; it is at
+/// least that of rounding to 8 bits.
 pub(crate) fn scatter(surface: &Surface, inside: &[&Sample]) -> ([[f64; 3]; 3], f64) {
     let mut cov = [[0.0; 3]; 3];
     for s in inside {
@@ -123,7 +126,7 @@ pub(crate) fn scatter(surface: &Surface, inside: &[&Sample]) -> ([[f64; 3]; 3], 
         .collect();
     let middle = squares.len() / 2;
     let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-    // Median of chi squared of one and of three degrees of freedom, cut at the gate.
+    // Median of chi squared with one and with three degrees of freedom, truncated at the gate.
     let expected = 0.4515 + (dimension - 1.0) * 0.914;
     let scale = *median / expected;
     cov.iter_mut().flatten().for_each(|v| *v *= scale);
@@ -150,7 +153,7 @@ pub(crate) fn inverse_factor(cov: &[[f64; 3]; 3], floor: f64) -> [[f64; 3]; 3] {
     [[w00, 0.0, 0.0], [w10, w11, 0.0], [w20, w21, w22]]
 }
 
-/// Colour of the surface at a place.
+/// Colour of the surface at a position.
 pub(crate) fn colour_at(surface: &Surface, place: [f64; 2]) -> [f64; 3] {
     let basis = basis(place);
     surface.map(|c| c.iter().zip(basis).map(|(c, b)| c * b).sum())

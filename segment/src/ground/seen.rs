@@ -17,9 +17,10 @@ use crate::outlines::regions::{fill_holes, hysteresis, open};
 
 /// Least fraction of the photo that a binder covers.
 pub(crate) const LEAST_COVERED: f64 = 0.2;
-/// Thresholds over the usual ones where no binder stands apart.
+/// Factor of the thresholds where no binder forms a mode of its own.
 const NEAR: f32 = 0.5;
-/// Thresholds of faint regions over those of clear ones: hardly any of the binder is further than three and a half deviations over many pixels at once.
+/// Factor of the thresholds of faint regions: hardly any mean of the binder over many pixels is farther than three and
+/// a half standard deviations.
 const FAINT: f32 = 0.7;
 /// Least scatter, sRGB / 255, while outlines are drawn: four levels.
 const HUE_SCATTER: f64 = 4.0 / 255.0;
@@ -29,9 +30,11 @@ const CLEAR: f32 = 0.7;
 const ITERATIONS: usize = 3;
 /// Holes of less than a twentieth of their region's area are filled before it is split.
 const HOLE_PART: usize = 20;
-/// Distance of two tones over the sum of their scatters from which they are two: 1.48 occurs in gravel, 1.62 to 1.85 in tomograms and thin sections.
+/// Distance of two tones over the sum of their scatters from which they are two: 1.48 occurs in gravel, 1.62 to 1.85 in
+/// tomograms and thin sections.
 const TWO_TONES: f64 = 1.55;
-/// Slope of the borders between two tones, in tone distances per pixel, from which they are edges: 0.15 occurs in shaded pebbles, 0.33 to 0.47 in tomograms and thin sections.
+/// Slope of the borders between two tones, in tone distances per pixel, from which they are edges: 0.15 occurs in
+/// shaded pebbles, 0.33 to 0.47 in tomograms and thin sections.
 const TONE_EDGE: f32 = 0.25;
 
 /// What lies between the particles, by which each later step has its own parameters.
@@ -39,9 +42,9 @@ const TONE_EDGE: f32 = 0.25;
 pub(crate) enum Ground {
     /// A binder whose colour forms a mode of its own, or was given.
     Binder(Box<BinderModel>),
-    /// The tone in thinner threads of a photo of two tones.
+    /// The tone of a photo of two tones that forms the thinner structures.
     TwoTones,
-    /// The densest colour of a photo without such a mode: its colours overlap with those of particles.
+    /// The most frequent colour of a photo without such a mode: its colours overlap with those of particles.
     Densest,
 }
 
@@ -57,7 +60,7 @@ pub(crate) struct Seen {
     pub(crate) thresholds: [f32; 2],
     /// Fraction of the photo's pixels that are ground.
     pub(crate) covered: f64,
-    /// Whether the rest stands apart from the ground.
+    /// Whether the rest is clearly separated from the ground.
     pub(crate) is_clear: bool,
 }
 
@@ -79,7 +82,8 @@ pub(crate) fn chosen_binder(colours: &Array2<[f32; 3]>, options: &SegmentOptions
 }
 
 impl Seen {
-    /// Chooses the ground: the binder if it is given or stands apart; else two tones with sharp borders; else the densest colour, if enough differs from it clearly; else the binder as it is.
+    /// Chooses the ground: the binder if it is given or clearly separated from the rest; else two tones with sharp
+    /// borders; else the most frequent colour, if enough differs from it clearly; else the binder after all.
     pub(crate) fn new(
         photo: &RgbImage,
         colours: &Array2<[f32; 3]>,
@@ -108,16 +112,17 @@ impl Seen {
             deviation: binder.blunted(HUE_SCATTER).deviation(colours),
             distance,
             thresholds: [low, high],
-            covered: binder.share(),
+            covered: binder.covered(),
             ground: Ground::Binder(Box::new(binder)),
         }
     }
 
-    /// `None` if the photo, its light evened by that of a binder and smoothed half as much, has not two tones with sharp borders.
+    /// `None` if the photo, its light evened by that of a binder and smoothed half as much, has not two tones with
+    /// sharp borders.
     fn by_two_tones(photo: &RgbImage, light: &BinderModel, options: &SegmentOptions) -> Option<Self> {
         let smoothed = gaussian_filter_rgb(encoded_image(photo).view(), 0.5 * options.smoothing);
         let even = light.even_light(&smoothed);
-        let tones = TwoTones::find(&even, options.seed).filter(|t| t.apart() > TWO_TONES)?;
+        let tones = TwoTones::find(&even, options.seed).filter(|t| t.separation() > TWO_TONES)?;
         let binder = tones.binder(&even);
         let deviation = binder.deviation(&even);
         let mut distance = deviation.mapv(length);
@@ -131,17 +136,17 @@ impl Seen {
             distance,
             deviation,
             thresholds: [low, 1.2 * low],
-            covered: binder.share(),
+            covered: binder.covered(),
             is_clear: true,
         })
     }
 
-    /// `None` if the densest colour covers little, or little differs from it clearly.
+    /// `None` if the most frequent colour covers little, or little differs from it clearly.
     fn by_densest(colours: &Array2<[f32; 3]>, options: &SegmentOptions) -> Option<Self> {
         let binder = BinderModel::fit_near(colours, densest(colours));
         let distance = binder.distance(colours);
         let thresholds = options.thresholds.map(|z| NEAR * z);
-        let is_clear = binder.share() > LEAST_COVERED
+        let is_clear = binder.covered() > LEAST_COVERED
             && surrounds(&distance.mapv(|z| z < thresholds[0]))
             && stands_out(&distance, thresholds);
         is_clear.then(|| Self {
@@ -149,7 +154,7 @@ impl Seen {
             deviation: binder.blunted(HUE_SCATTER).deviation(colours),
             distance,
             thresholds,
-            covered: binder.share(),
+            covered: binder.covered(),
             is_clear,
         })
     }
@@ -160,7 +165,8 @@ impl Seen {
         hysteresis(&self.distance, low, high)
     }
 
-    /// The regions with their outlines at half contrast and, beside a binder, faint regions added; their distances become those seen over many pixels.
+    /// The regions with their outlines at half contrast and, beside a binder, faint regions added; their distances
+    /// become those seen over many pixels.
     pub(crate) fn outlined(
         &mut self,
         mut mask: Array2<bool>,
@@ -168,7 +174,8 @@ impl Seen {
         options: &SegmentOptions,
     ) -> Array2<bool> {
         self.clean(&mut mask, options);
-        // The first outline follows the threshold, so that its cores hold blurred rims; later iterations have cleaner ones.
+        // The first outline follows the threshold, so that its cores hold blurred rims; later iterations have cleaner
+        // ones.
         let blur = options.smoothing.hypot(SHARP);
         for _ in 0..self.iterations() {
             mask = half_contrast(&self.deviation, &mask, blur);
@@ -182,7 +189,8 @@ impl Seen {
         mask
     }
 
-    /// Fills small holes and removes what is thinner than three pixels. Larger holes may be binder between particles that touch, and any hole between two tones may be: those are left until labels are known.
+    /// Fills small holes and removes what is thinner than three pixels. Larger holes may be binder between particles
+    /// that touch, and any hole between two tones may be: those are left until labels are known.
     fn clean(&self, mask: &mut Array2<bool>, options: &SegmentOptions) {
         if options.holes == Holes::Fill && !matches!(self.ground, Ground::TwoTones) {
             fill_holes(mask, |hole, around| hole <= options.min_area.max(around / HOLE_PART));
@@ -206,7 +214,8 @@ impl Seen {
     }
 }
 
-/// Median slope, across the border between two tones at half their distance, of the distance to one of them, in tone distances per pixel. 0 if there is no border.
+/// Median slope, across the border between two tones at half their distance, of the distance to one of them, in tone
+/// distances per pixel. 0 if there is no border.
 fn edge_slope(distance: &Array2<f32>) -> f32 {
     let (height, width) = distance.dim();
     let half = 0.5 * TONE_DISTANCE;
@@ -231,7 +240,8 @@ fn edge_slope(distance: &Array2<f32>) -> f32 {
     *slopes.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
-/// Whether a mask can be the binder: its largest connected component holds at least a third of it; and where most of the rest is connected too, the mask is the one in thinner threads.
+/// Whether a mask can be the binder: its largest connected component holds at least a third of it; and where most of
+/// the rest is connected too, the mask forms the thinner structures.
 fn surrounds(mask: &Array2<bool>) -> bool {
     let rest = mask.mapv(|m| !m);
     let fraction = rest.iter().filter(|m| **m).count() as f64 / rest.len() as f64;
@@ -251,7 +261,8 @@ fn fraction_in_largest(mask: &Array2<bool>) -> f64 {
         .map_or(0.0, |largest| *largest as f64 / all as f64)
 }
 
-/// Whether the distances to the binder have two modes: there are at least 0.6 times as many pixels beyond the high threshold as between the two.
+/// Whether the distances to the binder have two modes: there are at least 0.6 times as many pixels beyond the high
+/// threshold as between the two.
 fn stands_out(distance: &Array2<f32>, [low, high]: [f32; 2]) -> bool {
     let beyond = distance.iter().filter(|z| **z >= high).count();
     let between = distance.iter().filter(|z| **z >= low && **z < high).count();

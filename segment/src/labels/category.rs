@@ -10,7 +10,7 @@ use crate::ground::kmeans::{Clusters, kmeans, silhouette};
 use crate::labels::profile::Profile;
 use crate::options::CategoryCount;
 
-/// Profiles of like colour.
+/// Profiles of similar colour.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Category {
     /// Mean colour of its profiles, each weighted by its area, sRGB / 255.
@@ -21,17 +21,17 @@ pub struct Category {
     pub area: f64,
 }
 
-/// Silhouette below which colours form no groups.
+/// Mean silhouette below which colours form no groups.
 const GROUPED: f64 = 0.5;
 /// Most categories looked for.
 const MOST: usize = 8;
 
-/// Groups profiles by mean colour, in Lab, where distances are those the eye sees: k-means, as in the paper, for a number given or chosen. Sets [`Profile::category`] and returns the categories, most
-/// profiles first.
+/// Groups profiles by mean colour in CIE Lab, where distances are perceptual: k-means, as in the paper, for a given or
+/// chosen number of groups. Sets [`Profile::category`] and returns the categories, most profiles first.
 ///
 /// # Complexity
 ///
-/// Profiles × categories × rounds.
+/// Profiles × categories × iterations.
 ///
 /// # References
 ///
@@ -89,12 +89,13 @@ fn best_by_silhouette(colours: &[[f64; 3]], seed: u64) -> Clusters {
     best.1
 }
 
-/// Sets of unstructured colours to compare with.
+/// Reference sets of uniformly distributed colours.
 const REFERENCES: u64 = 10;
-/// Colours looked at by the gap statistic, at most.
+/// Most colours used by the gap statistic.
 const GAP_SAMPLE: usize = 400;
 
-/// Number of groups by the gap statistic: how much tighter k groups of the colours are than k groups of as many colours spread evenly over their box.
+/// Number of groups by the gap statistic: how much smaller the inertia of k groups of the colours is than that of k
+/// groups of as many colours distributed uniformly over their box.
 fn best_by_gap(colours: &[[f64; 3]], seed: u64) -> usize {
     let step = colours.len().div_ceil(GAP_SAMPLE).max(1);
     let points: Vec<[f64; 3]> = colours.iter().copied().step_by(step).collect();
@@ -134,8 +135,9 @@ fn best_by_gap(colours: &[[f64; 3]], seed: u64) -> usize {
     MOST.min(points.len().max(1))
 }
 
-/// Tests whether the sizes of whole profiles differ between categories ([`kruskal_wallis`]); `None` if fewer than two categories have five whole profiles or more. A small p-value means that size and
-/// colour are associated, so that categories should be unfolded separately.
+/// Tests whether the sizes of whole profiles differ between categories ([`kruskal_wallis`]); `None` if fewer than two
+/// categories have five whole profiles or more. A small p-value means that size and colour are associated, so that
+/// categories should be unfolded separately.
 ///
 /// # Examples
 ///

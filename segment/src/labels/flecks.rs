@@ -7,8 +7,9 @@ use crate::ground::binder::length;
 /// Least mean difference of a small profile from the binder, in standard deviations of the blunted binder.
 const VISIBLE: f64 = 2.5;
 
-/// Removes labels of fewer than eight times `least` pixels that are flecks: of the binder's texture, where less than a tenth of the label is at least `high` from the binder, or of
-/// the photo's compression, where the mean difference is hardly visible. `blunted` is the deviation from a [`blunted`](crate::BinderModel::blunted) binder.
+/// Removes labels of fewer than eight times `least` pixels that are flecks: of the binder's texture, where less than a
+/// tenth of the label is at least `high` from the binder, or of the photo's compression, where the mean difference is
+/// hardly visible. `blunted` is the deviation from a [`blunted`](crate::BinderModel::blunted) binder.
 pub(crate) fn remove_flecks(
     labels: &mut Array2<u32>,
     distance: &Array2<f32>,

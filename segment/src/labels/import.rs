@@ -1,4 +1,4 @@
-//! Label maps of other tools as segmentations.
+//! Segmentations from label maps of other tools.
 
 use image::RgbImage;
 use ndarray::Array2;
@@ -12,15 +12,17 @@ use crate::outlines::regions::neighbours4;
 use crate::segmentation::Segmentation;
 use stereology_metrics::Finding;
 
-/// Pieces from which a map of one or two numbers is a mask.
+/// Number of connected components beyond which a map of one or two numbers is a mask of classes.
 const MANY: u32 = 6;
 
 impl Segmentation {
-    /// Profiles of a label map drawn by hand or made by another tool, axes (y, x), 0 the binder. Numbers are kept; a label is one profile even if it is in pieces, which is the finding `split-label`.
+    /// Profiles of a label map drawn by hand or made by another tool, axes (y, x), 0 the binder. Numbers are kept. A
+    /// label is one profile even if it has several connected components; the finding `split-label` reports that.
     ///
     /// # Errors
     ///
-    /// A map of another size than the photo, without labels, or of three classes instead of profiles; an option out of range.
+    /// A map of another size than the photo, without labels, or of three classes instead of profiles; an option out of
+    /// range.
     ///
     /// # Complexity
     ///
@@ -53,15 +55,15 @@ impl Segmentation {
             return Err(too_large([photo.width(), photo.height()], MOST_PIXELS));
         }
         let largest = labels.iter().copied().max().unwrap_or(0);
-        let (pieces, count) = connected_components(labels.view(), |l| l != 0);
+        let (components, count) = connected_components(labels.view(), |l| l != 0);
         if count == 0 {
             return Err(SegmentError::NoLabels);
         }
         let used = distinct(&labels);
-        if is_mask(&labels, &pieces, count, &used) {
+        if is_mask(&labels, &components, count, &used) {
             return Err(SegmentError::ClassMask {
                 values: used.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and "),
-                pieces: count as usize,
+                components: count as usize,
             });
         }
         let mut findings = Vec::new();
@@ -71,11 +73,11 @@ impl Segmentation {
                 format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles beyond merged into one; export it as 32-bit TIFF"),
             ));
         }
-        let in_pieces = labels_in_pieces(&labels, &pieces);
-        if let Some(first) = in_pieces.first() {
+        let split = split_labels(&labels, &components);
+        if let Some(first) = split.first() {
             findings.push(Finding::new(
                 "split-label",
-                format!("{} labels are in more than one piece (the first is {first}); each is counted as one profile of their total area", in_pieces.len()),
+                format!("{} labels have more than one connected component (the first is {first}); each is counted as one profile of their total area", split.len()),
             ));
         }
         let given = used.len();
@@ -97,11 +99,11 @@ impl Segmentation {
     }
 }
 
-/// Labels whose pixels form several pieces, increasing.
-fn labels_in_pieces(labels: &Array2<u32>, pieces: &Array2<u32>) -> Vec<u32> {
+/// Labels with several connected components, increasing.
+fn split_labels(labels: &Array2<u32>, components: &Array2<u32>) -> Vec<u32> {
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     let mut last = (0, 0);
-    for pair in labels.iter().copied().zip(pieces.iter().copied()) {
+    for pair in labels.iter().copied().zip(components.iter().copied()) {
         if pair != last && pair.0 != 0 {
             pairs.push(pair);
         }
@@ -114,8 +116,9 @@ fn labels_in_pieces(labels: &Array2<u32>, pieces: &Array2<u32>) -> Vec<u32> {
     split
 }
 
-/// Whether a map holds classes (binder, inside, edge; or binder and particle) instead of a number for each profile: one or two numbers in many pieces, or the pieces of one number each in a rim of the other.
-fn is_mask(labels: &Array2<u32>, pieces: &Array2<u32>, count: u32, used: &[u32]) -> bool {
+/// Whether a map holds classes (binder, inside, edge; or binder and particle) instead of a number for each profile: one
+/// or two numbers with many components, or components of one number surrounded by the other.
+fn is_mask(labels: &Array2<u32>, components: &Array2<u32>, count: u32, used: &[u32]) -> bool {
     if used.len() > 2 {
         return false;
     }
@@ -123,16 +126,16 @@ fn is_mask(labels: &Array2<u32>, pieces: &Array2<u32>, count: u32, used: &[u32])
         return true;
     }
     let &[inside, edge] = used else { return false };
-    // For each piece of either number: does anything but the other number touch it?
+    // For each component of either number: does anything but the other number touch it?
     [(inside, edge), (edge, inside)].into_iter().any(|(core, rim)| {
         let mut cores = 0;
         let mut bare = vec![false; count as usize + 1];
         let mut seen = vec![false; count as usize + 1];
         for ((y, x), _) in labels.indexed_iter().filter(|(_, l)| **l == core) {
-            let piece = pieces[[y, x]] as usize;
-            cores += usize::from(!seen[piece]);
-            seen[piece] = true;
-            bare[piece] |= neighbours4([y, x], labels.dim()).any(|q| labels[q] != core && labels[q] != rim);
+            let component = components[[y, x]] as usize;
+            cores += usize::from(!seen[component]);
+            seen[component] = true;
+            bare[component] |= neighbours4([y, x], labels.dim()).any(|q| labels[q] != core && labels[q] != rim);
         }
         let rimmed = seen.iter().zip(&bare).filter(|(s, b)| **s && !**b).count();
         cores >= 2 && 2 * rimmed > cores

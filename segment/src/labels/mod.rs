@@ -1,4 +1,5 @@
-//! From a mask to labels, and from labels to profiles: touching particles split, profiles measured, counted and grouped by colour.
+//! From a mask to labels, and from labels to profiles: touching particles split, profiles measured, counted and grouped
+//! by colour.
 
 pub(crate) mod category;
 pub(crate) mod flecks;

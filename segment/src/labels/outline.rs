@@ -13,15 +13,15 @@ pub type Ring = Vec<[f64; 2]>;
 pub struct Outline {
     /// The label.
     pub id: u32,
-    /// Its connected pieces, each the ring around it and then those around its holes.
-    pub pieces: Vec<Vec<Ring>>,
+    /// Its connected components, each the ring around it and then those around its holes.
+    pub components: Vec<Vec<Ring>>,
 }
 
 impl Outline {
     /// Area inside the rings, square pixels.
     #[must_use]
     pub fn area(&self) -> f64 {
-        let rings = self.pieces.iter().map(|piece| match piece.split_first() {
+        let rings = self.components.iter().map(|component| match component.split_first() {
             Some((outer, holes)) => ring_area(outer).abs() - holes.iter().map(|h| ring_area(h).abs()).sum::<f64>(),
             None => 0.0,
         });
@@ -29,7 +29,8 @@ impl Outline {
     }
 }
 
-/// Outlines of all labels but 0, by increasing label, along the sides of pixels: [`fill_outlines`] gives the map back without a pixel's difference.
+/// Outlines of all labels but 0, by increasing label, along the sides of pixels: [`fill_outlines`] gives exactly the
+/// same map back.
 ///
 /// # Complexity
 ///
@@ -43,49 +44,50 @@ impl Outline {
 ///
 /// let labels = array![[0, 5, 5, 5], [0, 5, 0, 5], [2, 5, 5, 5]];
 /// let rings = outlines(&labels);
-/// assert_eq!((rings[1].id, rings[1].pieces[0].len(), rings[1].area()), (5, 2, 8.0)); // the ring around it and that of its hole
-/// assert_eq!(rings[0].pieces[0][0], [[0.0, 2.0], [1.0, 2.0], [1.0, 3.0], [0.0, 3.0]]);
+/// assert_eq!((rings[1].id, rings[1].components[0].len(), rings[1].area()), (5, 2, 8.0)); // the ring around it and that of its hole
+/// assert_eq!(rings[0].components[0][0], [[0.0, 2.0], [1.0, 2.0], [1.0, 3.0], [0.0, 3.0]]);
 /// assert_eq!(fill_outlines(&rings, labels.dim()).0, labels);
 /// ```
 #[must_use]
 pub fn outlines(labels: &Array2<u32>) -> Vec<Outline> {
-    let (pieces, count) = connected_components(labels.view(), |l| l != 0);
+    let (components, count) = connected_components(labels.view(), |l| l != 0);
     let (height, width) = labels.dim();
     let mut rings: Vec<(u32, Vec<Ring>)> = vec![(0, Vec::new()); count as usize + 1];
     let mut seen = Array2::from_elem(labels.dim(), false);
     for y in 0..height {
         for x in 0..width {
-            let piece = pieces[[y, x]];
-            if piece == 0 || seen[[y, x]] || (y > 0 && pieces[[y - 1, x]] == piece) {
+            let component = components[[y, x]];
+            if component == 0 || seen[[y, x]] || (y > 0 && components[[y - 1, x]] == component) {
                 continue;
             }
-            let entry = &mut rings[piece as usize];
+            let entry = &mut rings[component as usize];
             entry.0 = labels[[y, x]];
-            // The first ring met, going down the photo, is the one around the piece.
-            entry.1.push(follow(&pieces, &mut seen, [x, y]));
+            // In reading order the first ring of a component is the one around it.
+            entry.1.push(follow(&components, &mut seen, [x, y]));
         }
     }
     let mut found: Vec<Outline> = Vec::new();
     rings.retain(|(_, r)| !r.is_empty());
-    rings.sort_by_key(|(id, _)| *id); // stable: pieces stay in reading order
+    rings.sort_by_key(|(id, _)| *id); // stable: components stay in reading order
     for (id, rings) in rings {
         match found.last_mut().filter(|o| o.id == id) {
-            Some(outline) => outline.pieces.push(rings),
+            Some(outline) => outline.components.push(rings),
             None => found.push(Outline {
                 id,
-                pieces: vec![rings],
+                components: vec![rings],
             }),
         }
     }
     found
 }
 
-/// The ring that begins eastwards along the upper side of pixel (x, y), its piece at the right hand; upper sides on the way are marked.
-fn follow(pieces: &Array2<u32>, seen: &mut Array2<bool>, start: [usize; 2]) -> Ring {
-    let piece = pieces[[start[1], start[0]]];
+/// The ring that begins eastwards along the upper side of pixel (x, y), with its component on the right; upper sides
+/// passed on the way are marked in `seen`.
+fn follow(components: &Array2<u32>, seen: &mut Array2<bool>, start: [usize; 2]) -> Ring {
+    let component = components[[start[1], start[0]]];
     let inside = |x: isize, y: isize| {
         let at = usize::try_from(y).ok().zip(usize::try_from(x).ok());
-        at.and_then(|p| pieces.get(p)) == Some(&piece)
+        at.and_then(|p| components.get(p)) == Some(&component)
     };
     let (mut x, mut y, mut heading) = (start[0] as isize, start[1] as isize, 0_usize);
     let first = (x, y);
@@ -96,7 +98,7 @@ fn follow(pieces: &Array2<u32>, seen: &mut Array2<bool>, start: [usize; 2]) -> R
         }
         let (dx, dy) = [(1, 0), (0, 1), (-1, 0), (0, -1)][heading];
         (x, y) = (x + dx, y + dy);
-        // Pixels ahead at the right and at the left hand, heading east, south, west, north.
+        // Pixels ahead on the right and on the left, heading east, south, west, north.
         let (right, left) = [
             ((x, y), (x, y - 1)),
             ((x - 1, y), (x, y)),
@@ -122,7 +124,8 @@ fn follow(pieces: &Array2<u32>, seen: &mut Array2<bool>, start: [usize; 2]) -> R
     ring
 }
 
-/// Label map of outlines, axes (y, x), and how many pixels lie in more than one. A pixel belongs to the outline its centre is in, to the smaller one where they overlap; what lies outside the photo is left out.
+/// Label map of outlines, axes (y, x), and how many pixels lie in more than one. A pixel belongs to the outline that
+/// contains its centre, to the smaller one where outlines overlap; what lies outside the photo is left out.
 ///
 /// # Complexity
 ///
@@ -138,8 +141,8 @@ pub fn fill_outlines(outlines: &[Outline], (height, width): (usize, usize)) -> (
     let mut order: Vec<(f64, &Outline)> = outlines.iter().map(|o| (o.area(), o)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0)); // stable
     for (_, outline) in order {
-        for piece in &outline.pieces {
-            for (y, crossings) in crossings(piece, height) {
+        for component in &outline.components {
+            for (y, crossings) in crossings(component, height) {
                 for pair in crossings.chunks_exact(2) {
                     let pixel = |at: f64| whole_part((at - 0.5).ceil()).min(width);
                     for x in pixel(pair[0])..pixel(pair[1]) {
@@ -163,8 +166,8 @@ fn crossings(rings: &[Ring], height: usize) -> Vec<(usize, Vec<f64>)> {
             let (top, bottom) = if a[1] < b[1] { (*a, b) } else { (b, *a) };
             let row = |at: f64| whole_part((at - 0.5).ceil()).min(height);
             for y in row(top[1])..row(bottom[1]) {
-                let share = (y as f64 + 0.5 - top[1]) / (bottom[1] - top[1]);
-                all.push((y, top[0] + share * (bottom[0] - top[0])));
+                let fraction = (y as f64 + 0.5 - top[1]) / (bottom[1] - top[1]);
+                all.push((y, top[0] + fraction * (bottom[0] - top[0])));
             }
         }
     }
@@ -195,9 +198,10 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Outlines hold all there is to know of a map, whatever its pieces, holes and touching corners; their areas are pixels.
+        /// A map survives the round trip through outlines, whatever its components, holes and touching corners; areas
+        /// are numbers of pixels.
         #[test]
-        fn outlines_and_back(values in proptest::collection::vec(0_u32..4, 63)) {
+        fn maps_survive_the_round_trip(values in proptest::collection::vec(0_u32..4, 63)) {
             let labels = Array2::from_shape_vec((7, 9), values).unwrap();
             let found = outlines(&labels);
             for o in &found {

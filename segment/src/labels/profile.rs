@@ -1,10 +1,10 @@
-//! Profiles: what a label map and a photo say of each particle cut.
+//! Profiles: the measurements of each sectioned particle from a label map and a photo.
 
 use image::RgbImage;
 use ndarray::Array2;
 use stereology_metrics::{BoundingBox, EdgeRule, SamplingWindow};
 
-/// The trace of one particle on the section. Lengths in pixels, colours sRGB / 255.
+/// The section of one particle. Lengths in pixels, colours sRGB / 255.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Its number in the label map.
@@ -15,7 +15,7 @@ pub struct Profile {
     pub y: f64,
     /// Area, pixels.
     pub area: f64,
-    /// Diameter of the circle of that area, √(4 A / π).
+    /// Equivalent circular diameter (ECD), √(4 A / π).
     pub size: f64,
     /// Mean of the encoded values, 0 to 1.
     pub colour: [f64; 3],
@@ -23,7 +23,7 @@ pub struct Profile {
     pub category: u8,
     /// Whether the photo's edge cuts it.
     pub touches_edge: bool,
-    /// What it counts for in the window's area: 1 or 0 by the counting frame.
+    /// How much it counts by the edge rule: 1 or 0 by the associated point rule.
     pub weight: f64,
     /// Left, upper, right, lower edge, pixels.
     pub bounding_box: [usize; 4],
@@ -40,7 +40,8 @@ pub struct Window {
     pub area: f64,
 }
 
-/// Profiles of a label map by increasing number; those of fewer than `min_area` pixels are left out. Category 0 and weight 1 for now.
+/// Profiles of a label map by increasing number; those of fewer than `min_area` pixels are left out. Categories are 0
+/// and weights 1 until they are set.
 pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -> Vec<Profile> {
     #[derive(Clone)]
     struct Sums {
@@ -96,7 +97,7 @@ pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -
         .collect()
 }
 
-/// Diameter of the circle of an area.
+/// Equivalent circular diameter of an area.
 pub(crate) fn size_of_area(area: f64) -> f64 {
     (4.0 * area / std::f64::consts::PI).sqrt()
 }
@@ -116,7 +117,7 @@ pub(crate) fn distinct(labels: &Array2<u32>) -> Vec<u32> {
     ids
 }
 
-/// From a label to its place among the labels in use: a table while that is small, else a search.
+/// Position of a label among the labels in use: by a table while that is small, else by binary search.
 pub(crate) struct Index<'a> {
     ids: &'a [u32],
     table: Vec<u32>,
@@ -133,7 +134,7 @@ impl<'a> Index<'a> {
         Self { ids, table }
     }
 
-    /// Place of a label that is in use.
+    /// Position of a label that is in use.
     pub(crate) fn of(&self, label: u32) -> usize {
         match self.table.get(label as usize) {
             Some(&i) => i as usize,
@@ -142,7 +143,8 @@ impl<'a> Index<'a> {
     }
 }
 
-/// Gives every profile its weight; returns the area they belong to, and whether the frame of the associated point rule is limited because a profile extends over more than half the photo.
+/// Gives every profile its weight; returns the area they belong to, and whether the frame of the associated point rule
+/// is limited because a profile extends over more than half the photo.
 pub(crate) fn weigh(profiles: &mut [Profile], (height, width): (usize, usize), rule: EdgeRule) -> (f64, bool) {
     let boxes: Vec<BoundingBox> = profiles
         .iter()

@@ -1,4 +1,4 @@
-//! Basins of a field: maxima that stand out, and the ground that belongs to each.
+//! h-maxima of a field and its watershed.
 
 use std::cmp::Reverse;
 
@@ -12,29 +12,31 @@ const STEPS: f32 = 64.0;
 /// No pixel.
 const NONE: u32 = u32::MAX;
 
-/// Every pixel's hill, found by walking up the highest neighbour, and the saddles between hills.
+/// The basin of every pixel (the pixels from which steepest ascent leads to one peak), and the saddles between basins.
 ///
-/// Walks keep to neighbours in memory; only the saddles, a small part of the pixels, are sorted. Taking all pixels from the highest down gives the same maxima and was three times slower on large regions.
+/// Ascents stay near in memory, and only the saddles, a small fraction of the pixels, are sorted. Processing all pixels
+/// from the highest down gives the same maxima and was three times slower on large regions.
 pub(crate) struct Basins {
     width: usize,
-    /// Hill of each pixel, [`NONE`] outside.
+    /// Basin of each pixel, [`NONE`] outside.
     of: Array2<u32>,
-    /// Pixel at the top of each hill, and its height.
-    tops: Vec<(u32, f32)>,
-    /// Pixels of each hill.
+    /// Pixel at the peak of each basin, and its height.
+    peaks: Vec<(u32, f32)>,
+    /// Number of pixels of each basin.
     areas: Vec<usize>,
-    /// Highest first: height, and the two hills.
+    /// Highest first: height, and the two basins.
     saddles: Vec<(f32, u32, u32)>,
 }
 
 impl Basins {
-    /// Basins of the pixels whose part is not 0; those of different parts do not touch, pixels of one part do by sides and corners. `given` pixels are tops whatever is around them.
+    /// Basins of the pixels whose part is not 0. Basins of different parts are not neighbours; pixels of one part are
+    /// by sides and corners. `given` pixels are peaks whatever is around them.
     pub(crate) fn new(field: &Array2<f32>, parts: &Array2<u32>, given: impl Fn(usize) -> bool) -> Self {
         let (height, width) = field.dim();
         let (field, parts) = (field.as_standard_layout(), parts.as_standard_layout());
         let heights = field.as_slice().unwrap_or_default();
         let parts = parts.as_slice().unwrap_or_default();
-        // A total order, so that walks up end: of equals the first is the highest.
+        // A total order, so that ascents end: of equal pixels the first is the highest.
         let above = |a: usize, b: usize| heights[a] > heights[b] || (heights[a] >= heights[b] && a < b);
         let mut up = vec![NONE; heights.len()];
         for y in 0..height {
@@ -58,7 +60,7 @@ impl Basins {
                 up[i] = index(best);
             }
         }
-        let mut tops = Vec::new();
+        let mut peaks = Vec::new();
         let mut of = vec![NONE; heights.len()];
         let mut path = Vec::new();
         for start in 0..heights.len() {
@@ -71,13 +73,13 @@ impl Basins {
                 i = up[i] as usize;
             }
             if of[i] == NONE {
-                of[i] = index(tops.len());
-                tops.push((index(i), heights[i]));
+                of[i] = index(peaks.len());
+                peaks.push((index(i), heights[i]));
             }
-            let hill = of[i];
-            path.drain(..).for_each(|p| of[p] = hill);
+            let basin = of[i];
+            path.drain(..).for_each(|p| of[p] = basin);
         }
-        let mut areas = vec![0_usize; tops.len()];
+        let mut areas = vec![0_usize; peaks.len()];
         of.iter().filter(|o| **o != NONE).for_each(|&o| areas[o as usize] += 1);
         let mut saddles = Vec::new();
         for y in 0..height {
@@ -111,50 +113,52 @@ impl Basins {
         Self {
             width,
             of,
-            tops,
+            peaks,
             areas,
             saddles: highest_first(&saddles),
         }
     }
 
-    /// Basins whose top stands at least `h(place, height)` above the saddle to any higher one, by decreasing height.
-    fn standing_out(&self, h: impl Fn([usize; 2], f32) -> f32) -> Vec<u32> {
-        let rank = |hill: u32| {
-            let (pixel, height) = self.tops[hill as usize];
+    /// Basins whose peak stands at least `h(position, height)` above the saddle to any higher one, by decreasing
+    /// height.
+    fn h_maxima_of(&self, h: impl Fn([usize; 2], f32) -> f32) -> Vec<u32> {
+        let rank = |basin: u32| {
+            let (pixel, height) = self.peaks[basin as usize];
             (height, Reverse(pixel))
         };
-        let mut sets = DisjointSets::new(index(self.tops.len()));
-        let mut ended = vec![false; self.tops.len()];
+        let mut sets = DisjointSets::new(index(self.peaks.len()));
+        let mut ended = vec![false; self.peaks.len()];
         for &(saddle, a, b) in &self.saddles {
             let (a, b) = (sets.root(a), sets.root(b));
             if a == b {
                 continue;
             }
-            // The root of what was joined is its highest hill.
+            // The root of a set of joined basins is the highest of them.
             let (high, low) = if rank(a) > rank(b) { (a, b) } else { (b, a) };
-            let (pixel, height) = self.tops[low as usize];
+            let (pixel, height) = self.peaks[low as usize];
             ended[low as usize] = height - saddle < h(self.place(pixel), height);
             sets.join(high, low);
         }
-        let mut standing: Vec<u32> = (0..index(self.tops.len())).filter(|&i| !ended[i as usize]).collect();
-        standing.sort_by(|&a, &b| {
-            let ((p, height), (q, other)) = (self.tops[a as usize], self.tops[b as usize]);
+        let mut maxima: Vec<u32> = (0..index(self.peaks.len())).filter(|&i| !ended[i as usize]).collect();
+        maxima.sort_by(|&a, &b| {
+            let ((p, height), (q, other)) = (self.peaks[a as usize], self.peaks[b as usize]);
             other.total_cmp(&height).then(p.cmp(&q))
         });
-        standing
+        maxima
     }
 
-    /// Number of each chosen hill, from 1, on its pixels and on those of every other hill that is joined to it by higher saddles than to the rest; 0 where none is.
+    /// Number of each chosen basin, from 1, on its pixels and on those of every other basin that is joined to it by
+    /// higher saddles than to the rest; 0 where there is none.
     fn grown(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Array2<u32> {
         let named = self.named(numbers);
-        self.of.mapv(|hill| named.get(hill as usize).copied().unwrap_or(0))
+        self.of.mapv(|basin| named.get(basin as usize).copied().unwrap_or(0))
     }
 
-    /// That number, for each hill.
+    /// That number, for each basin.
     fn named(&self, numbers: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
-        let mut sets = DisjointSets::new(index(self.tops.len()));
-        let mut label = vec![0_u32; self.tops.len()];
-        numbers.into_iter().for_each(|(hill, n)| label[hill as usize] = n);
+        let mut sets = DisjointSets::new(index(self.peaks.len()));
+        let mut label = vec![0_u32; self.peaks.len()];
+        numbers.into_iter().for_each(|(basin, n)| label[basin as usize] = n);
         for &(_, a, b) in &self.saddles {
             let (a, b) = (sets.root(a), sets.root(b));
             let [first, second] = [label[a as usize], label[b as usize]];
@@ -163,21 +167,21 @@ impl Basins {
                 label[a as usize] = first.max(second);
             }
         }
-        (0..index(self.tops.len()))
+        (0..index(self.peaks.len()))
             .map(|i| label[sets.root(i) as usize])
             .collect()
     }
 
-    /// The ground of the hills that stand out, numbered from 1 by decreasing height.
+    /// Labels of the h-maxima, from 1 by decreasing height: each with its own basin and those joined to it.
     pub(crate) fn divided(&self, h: impl Fn([usize; 2], f32) -> f32) -> Array2<u32> {
-        self.grown(self.standing_out(h).into_iter().zip(1..))
+        self.grown(self.h_maxima_of(h).into_iter().zip(1..))
     }
 
-    /// How many hills that stand out have ground of at least `least` pixels.
+    /// How many of those labels have at least `least` pixels.
     pub(crate) fn count(&self, h: impl Fn([usize; 2], f32) -> f32, least: usize) -> usize {
-        let standing = self.standing_out(h);
-        let mut areas = vec![0_usize; standing.len() + 1];
-        for (number, area) in self.named(standing.into_iter().zip(1..)).iter().zip(&self.areas) {
+        let maxima = self.h_maxima_of(h);
+        let mut areas = vec![0_usize; maxima.len() + 1];
+        for (number, area) in self.named(maxima.into_iter().zip(1..)).iter().zip(&self.areas) {
             areas[*number as usize] += area;
         }
         areas.iter().skip(1).filter(|a| **a >= least).count()
@@ -188,30 +192,32 @@ impl Basins {
     }
 }
 
-/// Counting sort by height in steps, ties in order.
+/// Counting sort by height in steps of 1/64, stable.
 fn highest_first(saddles: &[(f32, u32, u32)]) -> Vec<(f32, u32, u32)> {
     let step = |s: &(f32, u32, u32)| whole_part(f64::from(s.0.clamp(0.0, 16_000.0) * STEPS));
-    let top = saddles.iter().map(step).max().unwrap_or(0);
-    let mut starts = vec![0_usize; top + 2];
-    saddles.iter().for_each(|s| starts[top - step(s) + 1] += 1);
+    let peak = saddles.iter().map(step).max().unwrap_or(0);
+    let mut starts = vec![0_usize; peak + 2];
+    saddles.iter().for_each(|s| starts[peak - step(s) + 1] += 1);
     (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
     let mut sorted = vec![(0.0, 0, 0); saddles.len()];
     for s in saddles {
-        let slot = &mut starts[top - step(s)];
+        let slot = &mut starts[peak - step(s)];
         sorted[*slot] = *s;
         *slot += 1;
     }
     sorted
 }
 
-/// Maxima of a positive field that stand at least `h(place, height)`, place being (y, x), above the saddle to any higher one: a number from 1 for each at its peak pixel, in order of decreasing height, 0 elsewhere.
+/// h-maxima of a positive field: maxima that stand at least `h([y, x], height)` above the saddle to any higher one. A
+/// number from 1 for each at its peak pixel, in order of decreasing height, 0 elsewhere.
 ///
-/// Every pixel belongs to the hill its highest neighbours (of 8) lead up to; hills are joined over their saddles, the highest first, and where two meet the lower one ends if it stands out less than `h` of its
-/// height. Saddles are compared in steps of 1/64.
+/// Every pixel belongs to the basin of the peak to which its highest neighbours (of 8) lead. Basins are joined over
+/// their saddles, the highest first; where two meet, the lower peak is no maximum if it stands less than `h` above the
+/// saddle. Saddles are compared in steps of 1/64.
 ///
 /// # Complexity
 ///
-/// Linear in pixels but for the inverse Ackermann function.
+/// Nearly linear in pixels.
 ///
 /// # Examples
 ///
@@ -222,23 +228,24 @@ fn highest_first(saddles: &[(f32, u32, u32)]) -> Vec<(f32, u32, u32)> {
 /// ```
 #[must_use]
 pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Array2<u32> {
-    let hills = Basins::new(field, &field.mapv(|v| u32::from(v > 0.0)), |_| false);
+    let basins = Basins::new(field, &field.mapv(|v| u32::from(v > 0.0)), |_| false);
     let mut out = Array2::zeros(field.dim());
-    for (number, hill) in (1..).zip(hills.standing_out(h)) {
-        out[hills.place(hills.tops[hill as usize].0)] = number;
+    for (number, basin) in (1..).zip(basins.h_maxima_of(h)) {
+        out[basins.place(basins.peaks[basin as usize].0)] = number;
     }
     out
 }
 
-/// Watershed: every pixel of `mask` gets the marker it is joined to by the highest way, ways going from pixel to pixel by sides and corners and being as high as their lowest pixel. Parts of the mask without a
-/// marker stay 0.
+/// Watershed: every pixel of `mask` gets the marker to which the highest path leads. Paths go from pixel to pixel by
+/// sides and corners, and a path is as high as its lowest pixel. Parts of the mask without a marker stay 0.
 ///
-/// Ground between markers is divided where walks up the highest neighbour part; hills without a marker go to the neighbour across their highest saddle, saddles within 1/64 counting as equal (Cousty et al. 2009). A flood by a priority queue
-/// (Meyer 1994) divides the same ground up to pixels of the borders and hills whose saddles count as equal, in n log n.
+/// The border between markers runs where steepest ascents part; basins without a marker join the neighbour across their
+/// highest saddle, where saddles within 1/64 count as equal (Cousty et al. 2009). Flooding by a priority queue (Meyer
+/// 1994) gives the same up to single pixels of the borders and basins whose saddles count as equal, in n log n.
 ///
 /// # Complexity
 ///
-/// Linear in pixels but for the inverse Ackermann function.
+/// Nearly linear in pixels.
 ///
 /// # References
 ///
@@ -256,10 +263,11 @@ pub fn h_maxima(field: &Array2<f32>, h: impl Fn([usize; 2], f32) -> f32) -> Arra
 pub fn watershed(field: &Array2<f32>, markers: &Array2<u32>, mask: &Array2<bool>) -> Array2<u32> {
     let markers = markers.as_standard_layout();
     let given = markers.as_slice().unwrap_or_default();
-    let hills = Basins::new(field, &mask.mapv(u32::from), |i| given[i] != 0);
-    let tops = (0..).zip(&hills.tops);
-    hills.grown(
-        tops.map(|(hill, top)| (hill, given[top.0 as usize]))
+    let basins = Basins::new(field, &mask.mapv(u32::from), |i| given[i] != 0);
+    let peaks = (0..).zip(&basins.peaks);
+    basins.grown(
+        peaks
+            .map(|(basin, peak)| (basin, given[peak.0 as usize]))
             .filter(|(_, n)| *n != 0),
     )
 }
@@ -307,34 +315,35 @@ mod tests {
         out
     }
 
-    /// Height of the lowest pixel on the highest way from each pixel of the mask to one of the chosen markers, by a flood with a priority queue; 0 where there is none.
-    fn highest_ways(
+    /// Height of the lowest pixel on the highest path from each pixel of the mask to one of the chosen markers, by
+    /// flooding with a priority queue; 0 where there is none.
+    fn highest_paths(
         field: &Array2<f32>,
         markers: &Array2<u32>,
         mask: &Array2<bool>,
         chosen: impl Fn(u32) -> bool,
     ) -> Array2<f32> {
-        let mut ways = Array2::zeros(field.dim());
+        let mut paths = Array2::zeros(field.dim());
         let mut heap: BinaryHeap<(u32, [usize; 2])> = markers
             .indexed_iter()
             .filter(|(_, marker)| **marker != 0 && chosen(**marker))
             .map(|((y, x), _)| (field[[y, x]].to_bits(), [y, x]))
             .collect();
         while let Some((level, p)) = heap.pop() {
-            if ways[p] > 0.0 {
+            if paths[p] > 0.0 {
                 continue;
             }
-            ways[p] = f32::from_bits(level);
+            paths[p] = f32::from_bits(level);
             for q in neighbours8(p, field.dim()) {
-                if mask[q] && ways[q] == 0.0 {
+                if mask[q] && paths[q] == 0.0 {
                     heap.push((field[q].to_bits().min(level), q));
                 }
             }
         }
-        ways
+        paths
     }
 
-    /// Smooth hills: distances to the outside of a few discs.
+    /// Smoothed distances from the outside of a few discs.
     fn discs(places: &[(usize, usize, usize)]) -> Array2<f32> {
         let mask = Array2::from_shape_fn((40, 50), |(y, x)| {
             places
@@ -345,7 +354,7 @@ mod tests {
     }
 
     proptest! {
-        /// Joining hills over saddles finds the maxima that joining all pixels finds.
+        /// Joining basins over saddles finds the maxima that joining all pixels finds.
         #[test]
         fn maxima_as_by_pixels(width in 1_usize..12, values in proptest::collection::vec(0_u8..40, 1..140), h in 1_u8..12) {
             let height = values.len() / width;
@@ -355,16 +364,16 @@ mod tests {
             prop_assert_eq!(h_maxima(&field, |_, _| h), maxima(&field, h));
         }
 
-        /// Every pixel gets a marker to which it has as high a way as to any, but for the step in which saddles are compared.
+        /// No marker has a higher path than the one that a pixel gets, up to the step in which saddles are compared.
         #[test]
-        fn watershed_takes_the_highest_way(places in proptest::collection::vec((5_usize..35, 5_usize..45, 2_usize..8), 1..6)) {
+        fn watershed_follows_the_highest_path(places in proptest::collection::vec((5_usize..35, 5_usize..45, 2_usize..8), 1..6)) {
             let field = discs(&places);
             let mask = field.mapv(|v| v > 0.2);
             let markers = h_maxima(&field, |_, _| 0.7);
             let labels = watershed(&field, &markers, &mask);
-            let highest = highest_ways(&field, &markers, &mask, |_| true);
+            let highest = highest_paths(&field, &markers, &mask, |_| true);
             for label in 0..=markers.iter().copied().max().unwrap_or(0) {
-                let own = highest_ways(&field, &markers, &mask, |marker| marker == label);
+                let own = highest_paths(&field, &markers, &mask, |marker| marker == label);
                 for (p, _) in labels.indexed_iter().filter(|(_, l)| **l == label) {
                     prop_assert!(highest[p] - own[p] <= 1.0 / STEPS, "{p:?} {} {}", highest[p], own[p]);
                     prop_assert_eq!(label == 0, !mask[p] || highest[p] == 0.0);

@@ -1,4 +1,4 @@
-//! Cores of regions: the pixels deep enough inside a particle to show its colour unmixed.
+//! Cores of regions: the pixels deep enough inside a particle to show its unmixed colour.
 
 use std::collections::VecDeque;
 
@@ -9,17 +9,18 @@ use crate::conversions::{index, whole_part};
 
 /// Depth, in pixels, beyond which blur no longer mixes the binder into a particle's colour.
 pub(crate) const CORE_DEPTH: f32 = 3.0;
-/// The same for small regions, as a share of the greatest depth within three pixels.
+/// The same for small regions, as a fraction of the greatest depth within three pixels.
 const CORE_SHARE: f32 = 0.9;
-/// Core pixels around one that its colour is averaged over, in each direction.
+/// The colour of a core pixel is the mean over the core pixels up to this far in each direction.
 const AROUND: usize = 2;
 /// No core.
 const NONE: u32 = u32::MAX;
 
 /// For each pixel of a mask and of a rim around it, the colour of the particle core it belongs to.
 ///
-/// A core pixel lies at least three pixels deep, or in the deeper part of a small region; other pixels take the nearest core's colour, averaged over the core pixels two around. Pixels beyond the rim, `reach`
-/// pixels out of the mask, get `None`.
+/// A core pixel lies at least three pixels deep, or in the deeper part of a small region. Its colour is the mean over
+/// the core pixels up to two pixels around it; other pixels take the colour of the nearest core pixel. Pixels more than
+/// `reach` pixels outside the mask get `None`.
 ///
 /// # Complexity
 ///
@@ -46,7 +47,7 @@ pub fn core_colours(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8
 pub(crate) struct Cores {
     /// The core pixel that each pixel belongs to, or [`NONE`].
     pub(crate) source: Array2<u32>,
-    /// Core pixels in reading order: colour, and the greatest depth in their piece of the mask.
+    /// Core pixels in reading order: colour, and the greatest depth in their component of the mask.
     pub(crate) known: Vec<([f32; 3], f32)>,
 }
 
@@ -54,10 +55,10 @@ impl Cores {
     pub(crate) fn new(deviation: &Array2<[f32; 3]>, mask: &Array2<bool>, reach: u8, core_depth: f32) -> Self {
         let (height, width) = mask.dim();
         let depth = distance_transform(mask.view());
-        let (pieces, count) = connected_components(mask.view(), |m| m);
+        let (components, count) = connected_components(mask.view(), |m| m);
         let mut largest = vec![0.0_f32; count as usize + 1];
-        for (&piece, &d) in pieces.iter().zip(&depth) {
-            let l = &mut largest[piece as usize];
+        for (&component, &d) in components.iter().zip(&depth) {
+            let l = &mut largest[component as usize];
             *l = l.max(d);
         }
         let mut core = highest_around(&depth, whole_part(f64::from(core_depth)));
@@ -70,7 +71,7 @@ impl Cores {
         for y in 0..height {
             means.at_row(y, |x, colour| {
                 source[[y, x]] = index(known.len());
-                known.push((colour, largest[pieces[[y, x]] as usize]));
+                known.push((colour, largest[components[[y, x]] as usize]));
             });
         }
         let mut cores = Self { source, known };
@@ -78,7 +79,7 @@ impl Cores {
         cores
     }
 
-    /// Colour of a pixel's core, and the greatest depth in the core's piece of the mask.
+    /// Colour of a pixel's core, and the greatest depth in the core's component of the mask.
     pub(crate) fn of(&self, p: (usize, usize)) -> Option<([f32; 3], f32)> {
         self.known.get(self.source[p] as usize).copied()
     }
@@ -92,16 +93,16 @@ impl Cores {
         };
         let pixels = height * width;
         let mut queue = VecDeque::new();
-        // Only cores at the border of their region have anything to pass on.
+        // Only core pixels at the border of their region have neighbours without a core.
         for y in 0..height {
             for x in 0..width {
                 let i = y * width + x;
-                let bare = |inside: bool, q: usize| inside && source[q] == NONE;
+                let is_open = |inside: bool, q: usize| inside && source[q] == NONE;
                 if source[i] != NONE
-                    && (bare(i >= width, i.wrapping_sub(width))
-                        || bare(x > 0, i.wrapping_sub(1))
-                        || bare(x + 1 < width, i + 1)
-                        || bare(i + width < pixels, i + width))
+                    && (is_open(i >= width, i.wrapping_sub(width))
+                        || is_open(x > 0, i.wrapping_sub(1))
+                        || is_open(x + 1 < width, i + 1)
+                        || is_open(i + width < pixels, i + width))
                 {
                     queue.push_back((index(i), index(x), 0_u8));
                 }
@@ -110,7 +111,7 @@ impl Cores {
         while let Some((i, x, outside)) = queue.pop_front() {
             let (i, x) = (i as usize, x as usize);
             let from = source[i];
-            let mut pass_on = |inside: bool, q: usize, x: usize| {
+            let mut assign = |inside: bool, q: usize, x: usize| {
                 if inside && source[q] == NONE {
                     let steps = if mask[q] { 0 } else { outside + 1 };
                     if steps <= reach {
@@ -119,10 +120,10 @@ impl Cores {
                     }
                 }
             };
-            pass_on(i >= width, i.wrapping_sub(width), x);
-            pass_on(x > 0, i.wrapping_sub(1), x.wrapping_sub(1));
-            pass_on(x + 1 < width, i + 1, x + 1);
-            pass_on(i + width < pixels, i + width, x);
+            assign(i >= width, i.wrapping_sub(width), x);
+            assign(x > 0, i.wrapping_sub(1), x.wrapping_sub(1));
+            assign(x + 1 < width, i + 1, x + 1);
+            assign(i + width < pixels, i + width, x);
         }
     }
 }
@@ -180,7 +181,7 @@ impl<'a> RowMeans<'a> {
         }
     }
 
-    /// Puts the mean at every core pixel of row `y`; rows are asked for in order.
+    /// Calls `put` with the mean at every core pixel of row `y`; rows must be requested in order.
     fn at_row(&mut self, y: usize, mut put: impl FnMut(usize, [f32; 3])) {
         let height = self.core.dim().0;
         let last = (y + AROUND + 1).min(height);

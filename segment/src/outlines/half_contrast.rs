@@ -1,4 +1,4 @@
-//! Outlines at half contrast: where a blurred edge really is.
+//! Outlines at half contrast: the true position of a blurred edge.
 
 use ndarray::{Array2, Zip};
 
@@ -10,13 +10,14 @@ const CLEAR_OF_BLUR: f32 = 2.2;
 pub(crate) const SHARP: f32 = 0.8;
 /// Pixels that an outline may move out in one call.
 const REACH: u8 = 2;
-/// 1 / (2 √(2π)): what a unit of curvature times blur takes from half the contrast.
+/// 1 / (2 √(2π)): by how much a unit of curvature times blur lowers the contrast at an edge below a half.
 const HALF_EDGE: f32 = 0.5 * 0.199_471_1;
-/// Most that curvature may take away: beyond, the first order is no guide.
+/// Largest correction for curvature: beyond it the first order is not valid.
 const MOST_CURVED: f32 = 0.12;
 
-/// Mask of the pixels that stand beyond half the step from the binder to their particle's core. The outline of a mask found by a threshold follows the threshold, and a low one, needed to find pale particles,
-/// makes every particle too large; at half the step a symmetric blur leaves a straight edge where it was.
+/// Mask of the pixels beyond half the step from the binder to their particle's core. The outline of a mask found by a
+/// threshold depends on the threshold, and a low one, needed to find pale particles, makes every particle too large. At
+/// half the step, a symmetric blur does not move a straight edge.
 ///
 /// # Formula
 ///
@@ -24,7 +25,8 @@ const MOST_CURVED: f32 = 0.12;
 /// keep p  ⇔  (p − b)·(c − b) ≥ (½ − s / (2 R √(2π))) |c − b|²        b binder, c core; differences scaled by the binder's scatter
 /// ```
 ///
-/// The edge of a disc of radius R is blurred below a half: to first order by s / (2 R √(2π)), s the standard deviation of the blur. R is that of the largest disc inside the region.
+/// The edge of a disc of radius R is blurred below a half: to first order by s / (2 R √(2π)), s the standard deviation
+/// of the blur. R is that of the largest disc inside the region.
 ///
 /// # Complexity
 ///

@@ -3,7 +3,8 @@
 use ndarray::Array2;
 use stereology_imaging::{Connectivity, connected_components, label_components};
 
-/// Pixels of at least `low` that hang together (8 neighbours) with one of at least `high`.
+/// Hysteresis threshold: connected components (8 neighbours) of pixels of at least `low` that contain one of at least
+/// `high`.
 ///
 /// # Examples
 ///
@@ -15,17 +16,18 @@ use stereology_imaging::{Connectivity, connected_components, label_components};
 #[must_use]
 pub fn hysteresis(distance: &Array2<f32>, low: f32, high: f32) -> Array2<bool> {
     let candidates = distance.mapv(|z| z >= low);
-    let (pieces, count) = label_components(candidates.view(), |c| c, Connectivity::Corners);
+    let (components, count) = label_components(candidates.view(), |c| c, Connectivity::Corners);
     let mut strong = vec![false; count as usize + 1];
-    for (&piece, &z) in pieces.iter().zip(distance) {
-        strong[piece as usize] |= z >= high;
+    for (&component, &z) in components.iter().zip(distance) {
+        strong[component as usize] |= z >= high;
     }
     strong[0] = false;
-    pieces.mapv(|piece| strong[piece as usize])
+    components.mapv(|component| strong[component as usize])
 }
 
-/// Fills the holes of a mask: pieces of the outside (4 neighbours) that do not reach the photo's edge and for which `fill(area of the hole, area of the mask around it)` holds, in pixels. The area around a
-/// hole is that of the piece of the mask that its first pixel's left neighbour belongs to.
+/// Fills the holes of a mask: connected components (4 neighbours) of the outside that do not reach the photo's edge and
+/// for which `fill(area of the hole, area of the mask around it)` holds, in pixels. The area around a hole is that of
+/// the component of the mask that its first pixel's left neighbour belongs to.
 ///
 /// # Examples
 ///
@@ -36,8 +38,8 @@ pub fn hysteresis(distance: &Array2<f32>, low: f32, high: f32) -> Array2<bool> {
 /// ```
 pub fn fill_holes(mask: &mut Array2<bool>, fill: impl Fn(usize, usize) -> bool) {
     let (outside, count) = connected_components(mask.view(), |m| !m);
-    let (inside, pieces) = connected_components(mask.view(), |m| m);
-    let mut areas = vec![0_usize; pieces as usize + 1];
+    let (inside, components) = connected_components(mask.view(), |m| m);
+    let mut areas = vec![0_usize; components as usize + 1];
     inside.iter().for_each(|&i| areas[i as usize] += 1);
     let mut holes = vec![(0_usize, 0_usize); count as usize + 1];
     for ((y, x), &o) in outside.indexed_iter() {
@@ -61,7 +63,8 @@ pub fn fill_holes(mask: &mut Array2<bool>, fill: impl Fn(usize, usize) -> bool) 
     mask.zip_mut_with(&outside, |m, &o| *m |= filled[o as usize]);
 }
 
-/// Opening by a cross of radius 1: removes lines and specks thinner than three pixels. The photo's edge does not erode.
+/// Opening by a cross of radius 1: removes lines and specks thinner than three pixels. There is no erosion from the
+/// photo's edge.
 ///
 /// # Examples
 ///

@@ -7,13 +7,13 @@ use stereology_segment::{
 };
 use tiff::encoder::{TiffEncoder, colortype};
 
-/// 16 bits are rounded, grey becomes colour, transparency shows white.
+/// 16 bits are rounded, grey becomes three channels, transparency is composited over white.
 #[test]
 fn kinds_of_photo() {
     let folder = tempfile::tempdir().unwrap();
-    let read = |picture: DynamicImage| {
+    let read = |image: DynamicImage| {
         let file = folder.path().join("photo.png");
-        picture.save(&file).unwrap();
+        image.save(&file).unwrap();
         read_photo(&file).unwrap().get_pixel(0, 0).0
     };
     assert_eq!(
@@ -46,7 +46,7 @@ fn kinds_of_photo() {
     );
 }
 
-/// Palettes are looked up, and a camera's note on how it was held is followed: the same picture, stored lying, with orientation 6, stands.
+/// Palettes are applied, and so is the EXIF orientation: an image stored on its side with orientation 6 is upright.
 #[test]
 fn palettes_and_orientation() {
     let folder = tempfile::tempdir().unwrap();
@@ -73,7 +73,7 @@ fn palettes_and_orientation() {
     assert!(standing.get_pixel(16, 10)[0] < 40 && standing.get_pixel(16, 54)[0] > 200);
 }
 
-/// Missing, empty, text and cut files are refused, each in its words.
+/// Missing, empty, text and truncated files are refused, each with its own error.
 #[test]
 fn bad_photos() {
     let folder = tempfile::tempdir().unwrap();
@@ -81,7 +81,7 @@ fn bad_photos() {
     assert!(matches!(read_photo(&file), Err(SegmentError::Open { .. })));
     std::fs::write(&file, b"").unwrap();
     assert!(matches!(read_photo(&file), Err(SegmentError::EmptyFile { .. })));
-    std::fs::write(&file, b"this is no picture").unwrap();
+    std::fs::write(&file, b"this is not an image").unwrap();
     assert!(matches!(read_photo(&file), Err(SegmentError::Decode { .. })));
     RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]))
         .save(&file)
@@ -149,9 +149,9 @@ fn written_and_read() {
     assert_eq!(samples, found.residual().into_raw_vec_and_offset().0);
 }
 
-/// A header that claims 10¹² pixels is refused before memory is asked for.
+/// A header that states 10¹² pixels is refused before memory is allocated.
 #[test]
-fn lying_headers() {
+fn false_headers() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("labels.tif");
     write_labels(&file, Array2::from_elem((16, 16), 1).view()).unwrap();
@@ -167,7 +167,7 @@ fn lying_headers() {
     assert!(refused.contains("labels.tif"), "{refused}");
 }
 
-/// Every kind of label file gives back numbers, pieces, holes and touching labels as they were.
+/// Numbers, components, holes and touching labels survive the round trip through every format.
 #[test]
 fn label_files_round_trip() {
     let folder = tempfile::tempdir().unwrap();
@@ -204,7 +204,8 @@ fn label_files_round_trip() {
     assert!(write_labels(folder.path().join("l.bmp"), labels.view()).is_err());
 }
 
-/// Numbers of fewer than eight bits are labels, not shades; TIFFs that show 0 as white hold the numbers they hold; NumPy arrays of any order and kind.
+/// Samples of fewer than eight bits are labels, not shades; TIFFs that show 0 as white are not inverted; NumPy arrays
+/// may have any order and type.
 #[test]
 fn labels_as_stored() {
     let folder = tempfile::tempdir().unwrap();
@@ -221,12 +222,12 @@ fn labels_as_stored() {
     assert_eq!(read_labels(&file).unwrap(), wanted);
     let mut out = std::fs::File::create(&file).unwrap();
     let mut encoder = TiffEncoder::new(&mut out).unwrap();
-    let mut picture = encoder.new_image::<colortype::Gray8>(3, 2).unwrap();
-    picture
+    let mut image = encoder.new_image::<colortype::Gray8>(3, 2).unwrap();
+    image
         .encoder()
         .write_tag(tiff::tags::Tag::PhotometricInterpretation, 0_u16)
         .unwrap();
-    picture.write_data(&[0, 3, 15, 7, 0, 1]).unwrap();
+    image.write_data(&[0, 3, 15, 7, 0, 1]).unwrap();
     encoder.write_image::<colortype::Gray8>(3, 2, &[9; 6]).unwrap();
     let read = read_labels_for(&file, (2, 3)).unwrap();
     assert_eq!((read.labels, read.findings[0].code), (wanted.clone(), "first-page"));

@@ -36,7 +36,7 @@ proptest! {
     }
 }
 
-/// One label in two pieces is one profile, and the result says so; so it does of the largest number of 8 bits.
+/// One label with two components is one profile, with a finding; the largest number of 8 bits has a finding too.
 #[test]
 fn pieces_and_clipping() {
     let found =
@@ -52,7 +52,7 @@ fn pieces_and_clipping() {
     );
 }
 
-/// Maps that cannot be meant are refused.
+/// Maps that cannot be labels are refused.
 #[test]
 fn refused() {
     let options = SegmentOptions::default();
@@ -68,11 +68,12 @@ fn refused() {
     let classes = squares(&[1, 2, 1, 2, 1, 2, 1, 2]);
     assert!(matches!(
         Segmentation::from_labels(&photo, classes, &options),
-        Err(SegmentError::ClassMask { pieces: 8, .. })
+        Err(SegmentError::ClassMask { components: 8, .. })
     ));
 }
 
-/// Masks of classes are refused however few their pieces: two particles, each in a rim; two labels side by side are not one.
+/// Masks of classes are refused however few their components: two particles, each in a rim. Two labels side by side are
+/// not such a mask.
 #[test]
 fn sparse_masks() {
     let options = SegmentOptions::default();
@@ -95,7 +96,7 @@ fn sparse_masks() {
     assert!(Segmentation::from_labels(&colours(20, 40), squares(&[1, 1]), &options).is_ok());
 }
 
-/// Small labels are left out, and the result says so.
+/// Small labels are left out, with a finding.
 #[test]
 fn small_labels() {
     let mut labels = squares(&[1, 2, 3, 4]);

@@ -1,8 +1,8 @@
-//! Laws of segmentation on drawn sections whose profiles are known.
+//! Laws of segmentation on synthetic test images whose profiles are known.
 
 #![allow(
     clippy::cast_possible_truncation,
-    reason = "drawn pictures have small sizes and levels"
+    reason = "synthetic test images have small sizes and levels"
 )]
 #![allow(clippy::float_cmp, reason = "the same arithmetic gives the same bits")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]

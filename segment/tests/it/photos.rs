@@ -39,7 +39,7 @@ proptest! {
         prop_assert!(found.findings.iter().all(|f| f.code == "few-profiles"), "{:?}", found.findings);
     }
 
-    /// Mirrored and turned photos show the same profiles.
+    /// Mirrored and rotated photos have the same profiles.
     #[test]
     fn mirrored_and_turned(seed in 0_u64..10_000) {
         let drawn = discs(20, SIZE, seed);
@@ -53,8 +53,9 @@ proptest! {
     }
 }
 
-/// The sizes of many discs are distributed as they were drawn, and their number and area are right: evenly from 10 to 32 pixels. The sizes found lie within 0.4 pixels of the drawn ones in order, so that the
-/// largest difference of the cumulative distributions is at most what shifting the law by as much makes of it, and one disc.
+/// The measured sizes of many discs have the distribution from which they were drawn, uniform from 10 to 32 pixels, and
+/// their number and area are right. In order, measured sizes are within 0.4 pixels of the true ones, so the largest
+/// difference of the cumulative distributions is at most that of shifting the law by as much, plus one disc.
 #[test]
 fn histogram_of_discs() {
     let size = [700, 520];
@@ -90,7 +91,7 @@ fn threads_do_not_matter() {
     assert_eq!(one.residual(), three.residual());
 }
 
-/// The colour of the binder may be given: here that of what covers less of the photo.
+/// The colour of the binder may be given: here the one that covers less of the photo.
 #[test]
 fn binder_given() {
     let photo = RgbImage::from_fn(120, 120, |x, y| {
@@ -133,7 +134,7 @@ fn touching_discs_come_apart() {
     }
 }
 
-/// Texture alone is no particle: an error or the finding that there is no binder.
+/// Texture alone is not a particle: it gives an error or the finding `no-binder`.
 #[test]
 fn nothing_to_separate() {
     let plain = photo(&[], SIZE, 5);
@@ -153,7 +154,7 @@ fn nothing_to_separate() {
     ));
 }
 
-/// Two rows less move the mean area of inner profiles by less than half a percent.
+/// Cropping two rows changes the mean area of inner profiles by less than half a percent.
 #[test]
 fn cropping_two_rows() {
     for seed in [4, 9] {
@@ -169,7 +170,7 @@ fn cropping_two_rows() {
     }
 }
 
-/// The residual has no mean in any profile nor in the binder.
+/// The residual has mean zero in every profile and in the binder.
 #[test]
 fn residual_has_no_mean() {
     let found = run(&photo(&discs(24, SIZE, 6), SIZE, 6));
@@ -183,7 +184,8 @@ fn residual_has_no_mean() {
     }
 }
 
-/// Discs sixteen levels lighter than a binder whose texture has eight levels of scatter are found where the texture is averaged away.
+/// Discs sixteen levels lighter than a binder whose texture has eight levels of scatter are found where the texture is
+/// averaged out.
 #[test]
 fn faint_discs() {
     let drawn = discs(12, SIZE, 2);
@@ -207,7 +209,7 @@ fn faint_discs() {
     }
 }
 
-/// A cancelled call says so.
+/// A cancelled call returns the error `Cancelled`.
 #[test]
 fn cancelled() {
     let photo = photo(&discs(5, SIZE, 1), SIZE, 1);
@@ -217,8 +219,9 @@ fn cancelled() {
     ));
 }
 
-/// Both rules are unbiased: discs of two sizes thrown at random over a plane larger than the photo are counted in proportion to their densities, although large ones are cut more often. 400 photos; the
-/// bound is 5 standard errors (false alarm 1e-6).
+/// Both rules are unbiased: discs of two sizes thrown at random over a plane larger than the photo are counted in
+/// proportion to their densities, although large ones are cut more often. 400 photos; the bound is 5 standard errors
+/// (false alarm 1e-6).
 #[test]
 fn edge_rules_are_unbiased() {
     use rand::{RngExt, SeedableRng};
@@ -253,8 +256,9 @@ fn edge_rules_are_unbiased() {
     }
 }
 
-/// Two tones: pale grains close together in a mottled binder of medium grey. Between some of them the binder is darker, but no darker than its mottles reach: pores, not profiles. Black grains are profiles,
-/// though they lie on the pores' side of the binder.
+/// Two tones: pale grains close together in a mottled binder of medium grey. Between some of them the binder is darker,
+/// but no darker than its mottles reach: pores, not profiles. Black grains are profiles, though they lie on the pores'
+/// side of the binder.
 #[test]
 fn dark_pores_and_dark_grains() {
     const CELL: usize = 28;

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use stereology::microgeometry::{ContactDistribution, EstimateOptions, Law, contact_of_picture, refined};
+use stereology::microgeometry::{ContactDistribution, EstimateOptions, Law, contact_of_image, refined};
 use stereology::shape::{Body, Subdivision, TriangleMesh};
 
 /// A relief's recipe.
@@ -42,7 +42,7 @@ fn field() -> Result<ContactDistribution> {
             .sum::<f64>()
             > 0.0
     });
-    Ok(contact_of_picture(picture.view(), &EstimateOptions::default())?)
+    Ok(contact_of_image(picture.view(), &EstimateOptions::default())?)
 }
 
 pub fn fine(mesh: TriangleMesh, edge: f64) -> Result<TriangleMesh> {

@@ -93,7 +93,7 @@ pub fn draw_residual(folder: &Path) -> Result<()> {
     let parts = [
         part(&sample::photo()?),
         part(&made.segmentation.means()),
-        part(&made.segmentation.residual_picture()),
+        part(&made.segmentation.residual_image()),
         synthesised,
     ];
     row(&parts)

@@ -34,7 +34,8 @@ pub struct Everywhere {
     pub invocation: Invocation,
 }
 
-/// How a command was invoked, so that a reader of its output can repeat it. It does not depend on folders or the number of threads.
+/// How a command was invoked, so that a reader of its output can repeat it. It does not depend on folders or the number
+/// of threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Invocation {
     /// The command with all options given; files without their folders.

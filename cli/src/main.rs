@@ -1,7 +1,7 @@
 //! The program `stereology`: from a photograph of a cut through a material to the solid it came from.
 //!
-//! Every command is a module of [`commands`]: its options with their help, and a thin `run` that calls the libraries and fills an
-//! [`answer::Answer`].
+//! Every command is a module of [`commands`]: its options with their help, and a thin `run` that calls the libraries
+//! and fills an [`answer::Answer`].
 
 mod answer;
 mod commands;

@@ -86,8 +86,8 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Begins to write `target`, as `target.partial` beside it.
     ///
-    /// A folder that contains anything is refused. With `force`, [`publish`](Self::publish) replaces it, but only if it is an output of this program (it has
-    /// a `summary.json` of ours), so that no other folder is replaced by mistake.
+    /// A folder that contains anything is refused. With `force`, [`publish`](Self::publish) replaces it, but only if it
+    /// is an output of this program (it has a `summary.json` of ours), so that no other folder is replaced by mistake.
     pub fn begin(target: &Path, force: bool) -> Result<Self, Failure> {
         let target = named(target)?;
         let place = target.display();

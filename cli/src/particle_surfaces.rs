@@ -24,7 +24,8 @@ pub fn check_ending(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the faces of all particles, each whole where its centre is in the box; every face knows its particle, size, shape and category.
+/// Writes the faces of all particles, each whole where its centre is in the box; every face knows its particle, size,
+/// shape and category.
 pub fn write(path: &Path, bodies: &[UnitBody], particles: &[Particle]) -> Result<(), Failure> {
     let outlines: Vec<TriangleMesh> = bodies.iter().map(|body| outline(body, particles.len())).collect();
     let faces: usize = particles.iter().map(|p| outlines[p.shape].triangles.len()).sum();

@@ -20,9 +20,10 @@ const STYLES: Styles = Styles::styled()
 
 /// From a photograph of a cut through a material to the solid it came from.
 ///
-/// Terrazzo, concrete, asphalt and conglomerate consist of particles in a binder. A plane section shows profiles of the particles; stereology estimates from
-/// their number and sizes how many particles of each size the solid contains. This program makes that estimate, packs such particles without overlap into a
-/// periodic box, and gives them the colours and the texture of the photograph. The result is a solid that can be sectioned anywhere.
+/// Terrazzo, concrete, asphalt and conglomerate consist of particles in a binder. A plane section shows profiles of the
+/// particles; stereology estimates from their number and sizes how many particles of each size the solid contains. This
+/// program makes that estimate, packs such particles without overlap into a periodic box, and gives them the colours
+/// and the texture of the photograph. The result is a solid that can be sectioned anywhere.
 ///
 /// All steps at once:    stereology synthesize photo.jpg -o out
 /// Step by step:         segment -> unfold (kmatrix) -> pack -> texture

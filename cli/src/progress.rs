@@ -14,7 +14,8 @@ static STOPPED: AtomicBool = AtomicBool::new(false);
 
 /// Makes Ctrl-C stop the running step; a second Ctrl-C ends the program at once.
 pub fn stop_on_ctrl_c() {
-    // Without a handler Ctrl-C ends the program at once. That is safe too, because outputs are renamed only when complete.
+    // Without a handler Ctrl-C ends the program at once. That is safe too, because outputs are renamed only when
+    // complete.
     let _ = ctrlc::set_handler(|| {
         if STOPPED.swap(true, Ordering::SeqCst) {
             std::process::exit(130);

@@ -1,4 +1,5 @@
-//! Values of options: positive numbers, lists, colours, shapes with their fractions. The message for a wrong value says what is allowed.
+//! Values of options: positive numbers, lists, colours, shapes with their fractions. The message for a wrong value says
+//! what is allowed.
 
 use std::str::FromStr;
 

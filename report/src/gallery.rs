@@ -3,7 +3,8 @@
 use askama::Template;
 use serde::Serialize;
 
-/// Random reliefs on one mesh: a page that shows the images `pictures/NAME.png` beside it and refers to `designs/NAME.json`.
+/// Random reliefs on one mesh: a page that shows the images `pictures/NAME.png` beside it and refers to
+/// `designs/NAME.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Gallery<R> {
     /// File name of the mesh.
@@ -14,7 +15,8 @@ pub struct Gallery<R> {
     pub seed: u64,
     /// The command that generated the gallery.
     pub command: String,
-    /// Ranges from which parameters were drawn: an object with `units`, `lengths`, `scales` (pairs of numbers) and `contact`.
+    /// Ranges from which parameters were drawn: an object with `units`, `lengths`, `scales` (pairs of numbers) and
+    /// `contact`.
     pub ranges: R,
     /// The reliefs.
     pub candidates: Vec<Candidate>,

@@ -4,12 +4,12 @@
 //! - [`MeasureReport`]: the slices of a volume compared with an exemplar.
 //! - [`Gallery`]: random reliefs on a mesh, to filter, sort and choose from.
 //!
-//! Every page is an askama template, so that text from outside is escaped. A page contains nothing that differs between two runs
-//! with the same inputs and seed. The first two are single files without scripts and links: images and plots are inside. The
-//! gallery refers to images beside it.
+//! Every page is an askama template, so that text from outside is escaped. A page contains nothing that differs between
+//! two runs with the same inputs and seed. The first two are single files without scripts and links: images and plots
+//! are inside. The gallery refers to images beside it.
 //!
-//! The alternative to templates was to push strings: text and markup were then hard to tell apart, and one forgotten call of the
-//! escaping function was enough for a file name to become markup.
+//! The alternative to templates was to push strings: text and markup were then hard to tell apart, and one forgotten
+//! call of the escaping function was enough for a file name to become markup.
 
 mod checks;
 mod data_url;

@@ -22,11 +22,13 @@ use stereology_report::counted;
 
 /// Carves a mesh from a finished solid and writes it with the solid's texture as vertex colours
 ///
-/// DIR is an output folder of `stereology synthesize`. The longest side of the mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
-/// another length; its coordinates are kept. Triangles are bisected until linear interpolation along every edge reproduces the colours, until edges are as
-/// short as a pixel of the photograph, or until there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
+/// DIR is an output folder of `stereology synthesize`. The longest side of the mesh (.obj, .stl, .ply) spans one period
+/// of the solid, unless --period gives another length; its coordinates are kept. Triangles are bisected until linear
+/// interpolation along every edge reproduces the colours, until edges are as short as a pixel of the photograph, or
+/// until there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
 ///
-/// With --atlas the mesh keeps its triangles and the texture is baked into an image inside the .glb, as games and web viewers expect.
+/// With --atlas the mesh keeps its triangles and the texture is baked into an image inside the .glb, as games and web
+/// viewers expect.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology carve out bunny.obj -o bunny.glb\n         stereology carve out crate.obj --atlas 2048 -o crate.glb"
@@ -47,7 +49,8 @@ pub struct Carve {
     /// Maximum number of triangles
     #[arg(long, value_name = "N", default_value_t = CarveOptions::default().most_triangles, value_parser = count)]
     pub triangles: usize,
-    /// Keep the triangles and bake the texture into a square image with this many pixels along a side, at most 16384; .glb only
+    /// Keep the triangles and bake the texture into a square image with this many pixels along a side, at most 16384;
+    /// .glb only
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384), conflicts_with = "triangles")]
     pub atlas: Option<u32>,
     /// File: .glb or .ply

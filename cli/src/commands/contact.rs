@@ -17,15 +17,18 @@ use crate::failure::{Explain, Failure};
 use crate::outputs::{check_file, write_text};
 use crate::values::{bins, not_negative, positive};
 
-/// Measures the spherical contact distribution of two regions: the distances of their points to the interface between them
+/// Measures the spherical contact distribution of two regions: the distances of their points to the interface between
+/// them
 ///
-/// `stereology displace` gives meshes a relief with this distribution. IMAGE is an image whose light pixels are the positive region and whose dark pixels are
-/// the negative region, separated by Otsu's threshold unless --threshold is given. It can also be a volume (.npy, axes z, y, x: pores and material), a label
-/// map (--labels), or a contact distribution to edit (.json). Without IMAGE the distribution follows from formulas (--negative-law, --positive-law):
+/// `stereology displace` gives meshes a relief with this distribution. IMAGE is an image whose light pixels are the
+/// positive region and whose dark pixels are the negative region, separated by Otsu's threshold unless --threshold is
+/// given. It can also be a volume (.npy, axes z, y, x: pores and material), a label map (--labels), or a contact
+/// distribution to edit (.json). Without IMAGE the distribution follows from formulas (--negative-law, --positive-law):
 /// uniform:R, disc:R, exponential:S, rayleigh:S, boolean:R,LAMBDA, bell:MEAN,DEVIATION.
 ///
-/// Distances are measured from the interface, which runs half way between pixels, and are corrected for the part that the border of the image hides.
-/// --counting paper measures as Schroeder et al. 2005: from pixel to pixel, in whole pixels, without a correction at the border.
+/// Distances are measured from the interface, which runs half way between pixels, and are corrected for the part that
+/// the border of the image hides. --counting paper measures as Schroeder et al. 2005: from pixel to pixel, in whole
+/// pixels, without a correction at the border.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology contact --negative-law exponential:2 --positive-law disc:6 --share 0.4 -o cells.json\n          stereology contact gravel.png --edit 5=0 --edit -1=0.2 -o edited.json"
@@ -52,7 +55,8 @@ pub struct Contact {
     /// Swap the positive and the negative region
     #[arg(long)]
     pub invert: bool,
-    /// Set the fraction of a bin, before all are normalised: bins 0, 1, ... are the positive region, -1, -2, ... the negative; may be repeated
+    /// Set the fraction of a bin, before all are normalised: bins 0, 1, ... are the positive region, -1, -2, ... the
+    /// negative; may be repeated
     #[arg(long, value_name = "BIN=SHARE", value_parser = edit, allow_hyphen_values = true)]
     pub edit: Vec<(i64, f64)>,
     /// Distribution of distances in the negative region, without IMAGE

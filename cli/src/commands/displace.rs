@@ -29,13 +29,15 @@ use stereology_report::counted;
 
 /// Displaces a mesh by a random relief with a given spherical contact distribution
 ///
-/// MESH (.obj, .ply, .stl; closed or open, with one or several connected components) is scaled so that the longest side of its bounding box is 2 U units of the
-/// contact distribution. Every triangle gets a label: a signed distance to the interface between two regions. The labels follow the distribution in FILE, and
-/// no two differ by more than their distance over the surface. Each vertex then moves along its normal by s k f(|label|), in halves of the longest side of the
-/// bounding box. Another --seed gives another relief of the same kind.
+/// MESH (.obj, .ply, .stl; closed or open, with one or several connected components) is scaled so that the longest side
+/// of its bounding box is 2 U units of the contact distribution. Every triangle gets a label: a signed distance to the
+/// interface between two regions. The labels follow the distribution in FILE, and no two differ by more than their
+/// distance over the surface. Each vertex then moves along its normal by s k f(|label|), in halves of the longest side
+/// of the bounding box. Another --seed gives another relief of the same kind.
 ///
-/// The mesh must be fine enough for the relief: edges about as long as the width of a bin (--edge-length). S,K,F is a direction s (out, in, none), a scale k
-/// (typically 0.01 to 0.05) and a function f: x (sharp), sqrt (rounded), or a table such as 0=0;2=0;3=1.
+/// The mesh must be fine enough for the relief: edges about as long as the width of a bin (--edge-length). S,K,F is a
+/// direction s (out, in, none), a scale k (typically 0.01 to 0.05) and a function f: x (sharp), sqrt (rounded), or a
+/// table such as 0=0;2=0;3=1.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology contact gravel.png -o contact.json\n          stereology displace bust.obj --contact contact.json --units 60 --negative in,0.02,sqrt --positive out,0.03,sqrt -o relief.glb\n          stereology displace bust.obj --contact contact.json --preset fig8-coral -o coral.ply\n          stereology displace vase.obj --design design.json --seed 7 -o vase7.glb"
@@ -47,7 +49,8 @@ pub struct Displace {
     /// Contact distribution, written by `stereology contact`
     #[arg(long, value_name = "FILE", required_unless_present = "design")]
     pub contact: Option<PathBuf>,
-    /// Half the longest side of the mesh's bounding box, in units of the distribution: more units give a finer structure
+    /// Half the longest side of the mesh's bounding box, in units of the distribution: more units give a finer
+    /// structure
     #[arg(long, value_name = "U", required_unless_present_any = ["design", "preset"], value_parser = positive)]
     pub units: Option<f64>,
     /// Design from `stereology explore` or --design-out, which holds all settings; other options override it

@@ -25,14 +25,16 @@ use stereology_report::significant;
 
 /// Synthesises a solid whose slices look like an image, for materials without separate particles
 ///
-/// For example laminar carbons, wood, sediments, porous rock and gravel. Rows of the first IMAGE run along z and its columns along x: it shows slices of constant
-/// y. A second IMAGE (or the first one) shows slices of constant x, with rows along z and columns along y. With --views 3 a third IMAGE (or the last one) shows
-/// slices of constant z, with rows along y and columns along x. For layered materials use --views 2 and an image with horizontal layers. All images must have
-/// the same scale, which is also the scale of the solid.
+/// For example laminar carbons, wood, sediments, porous rock and gravel. Rows of the first IMAGE run along z and its
+/// columns along x: it shows slices of constant y. A second IMAGE (or the first one) shows slices of constant x, with
+/// rows along z and columns along y. With --views 3 a third IMAGE (or the last one) shows slices of constant z, with
+/// rows along y and columns along x. For layered materials use --views 2 and an image with horizontal layers. All
+/// images must have the same scale, which is also the scale of the solid.
 ///
-/// The solid repeats without a seam unless --open is given. An image with exactly two grey levels is taken as a map of two phases, and the solid has exactly
-/// their fractions (--kind picture prevents this). The methods wei-levoy, kopf and chen-wang follow Urs et al. 2012, voxel by voxel along --scan; best is our own
-/// method. Measure the similarity of the result with `stereology measure`.
+/// The solid repeats without a seam unless --open is given. An image with exactly two grey levels is taken as a map of
+/// two phases, and the solid has exactly their fractions (--kind picture prevents this). The methods wei-levoy, kopf
+/// and chen-wang follow Urs et al. 2012, voxel by voxel along --scan; best is our own method. Measure the similarity of
+/// the result with `stereology measure`.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology exemplar fringes.png --views 2 --size 128 -o carbon.npy\n         stereology measure fringes.png carbon.npy --slices xz,yz"
@@ -50,7 +52,8 @@ pub struct Exemplar {
     /// Order in which the sequential solver visits voxels
     #[arg(long, value_enum, default_value_t = Scan::Hilbert)]
     pub scan: Scan,
-    /// 2: slices of constant y and x look like the images (layers); 3: slices of constant z too [default: 3; with two or three images, their number]
+    /// 2: slices of constant y and x look like the images (layers); 3: slices of constant z too [default: 3; with two
+    /// or three images, their number]
     #[arg(long, value_name = "N", value_parser = views)]
     pub views: Option<exemplar::Views>,
     /// Whether voxels are updated one after the other or all at once [default: batch for best, otherwise sequential]
@@ -59,7 +62,8 @@ pub struct Exemplar {
     /// How the most similar neighbourhood of the image is found
     #[arg(long, value_enum, default_value_t = Search::KCoherence)]
     pub search: Search,
-    /// Number of resolution levels, each half as fine as the one before [default: depends on the size of the image's features]
+    /// Number of resolution levels, each half as fine as the one before [default: depends on the size of the image's
+    /// features]
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
     /// Side of the neighbourhood in pixels, odd
@@ -71,7 +75,8 @@ pub struct Exemplar {
     /// Iterations per level
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
     pub iterations: usize,
-    /// Number of similar pixels stored for each pixel, for k-coherence [default: 12 for best, 15 for chen-wang, otherwise 4]
+    /// Number of similar pixels stored for each pixel, for k-coherence [default: 12 for best, 15 for chen-wang,
+    /// otherwise 4]
     #[arg(long, value_name = "K", value_parser = count)]
     pub similar: Option<usize>,
     /// Meaning of the image's values
@@ -86,7 +91,8 @@ pub struct Exemplar {
     /// Closed mesh (fitted into the box), SHAPE, or .npy (z, y, x; not 0 inside); voxels outside stay 0
     #[arg(long, value_name = "MESH|NPY")]
     pub mask: Option<PathBuf>,
-    /// Also write the pixel from which each voxel was copied, u32, row x width + column, counted through all images; 4294967295 outside the mask
+    /// Also write the pixel from which each voxel was copied, u32, row x width + column, counted through all images;
+    /// 4294967295 outside the mask
     #[arg(long, value_name = "FILE")]
     pub sources: Option<PathBuf>,
     /// File for the solid: .npy, .nrrd, .vti, .tif, .h5 or .zarr

@@ -28,9 +28,10 @@ use crate::values::{count, positive};
 
 /// Generates many random reliefs on one mesh and shows them in a gallery
 ///
-/// The contact distribution, the units, and the directions, scales and functions of the displacements are drawn at random within ranges; options fix them.
-/// DIR/index.html is a web page that shows an image of each candidate with its parameters and can filter and sort them. DIR/designs holds a design of each for
-/// `stereology displace MESH --design`. --near searches in the neighbourhood of one design.
+/// The contact distribution, the units, and the directions, scales and functions of the displacements are drawn at
+/// random within ranges; options fix them. DIR/index.html is a web page that shows an image of each candidate with its
+/// parameters and can filter and sort them. DIR/designs holds a design of each for `stereology displace MESH --design`.
+/// --near searches in the neighbourhood of one design.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology explore bust.obj --count 500 -o gallery\n          stereology explore bust.obj --count 48 --near gallery/designs/0042.json --spread 0.2 -o closer\n          stereology explore bust.obj --count 100 --contact gravel.json --units 30,60 -o gravels"

@@ -18,14 +18,16 @@ use crate::values::count;
 
 /// Writes one period of a finished solid as voxels
 ///
-/// DIR is an output folder of `stereology synthesize`. The grid has N voxels along the box's longest side. Each voxel holds one channel: rgb (colour, u8), id
-/// (particle number, u32, 0 = binder), category (number of the colour category, u8, 0 = binder), distance (signed distance to the nearest particle surface,
-/// f32, negative inside) or alpha (mask, u8, 0 in voids). All formats store the same values; the axes are (z, y, x, channel).
+/// DIR is an output folder of `stereology synthesize`. The grid has N voxels along the box's longest side. Each voxel
+/// holds one channel: rgb (colour, u8), id (particle number, u32, 0 = binder), category (number of the colour category,
+/// u8, 0 = binder), distance (signed distance to the nearest particle surface, f32, negative inside) or alpha (mask,
+/// u8, 0 in voids). All formats store the same values; the axes are (z, y, x, channel).
 ///
-/// .h5 is a DREAM.3D file (ids as FeatureIds). .zarr is an OME-Zarr 0.5 folder with axes (c, z, y, x), several resolutions and shards of 32 planes.
+/// .h5 is a DREAM.3D file (ids as FeatureIds). .zarr is an OME-Zarr 0.5 folder with axes (c, z, y, x), several
+/// resolutions and shards of 32 planes.
 ///
-/// The file is written plane by plane, so memory does not limit its size. With --resume an interrupted write keeps FILE.partial, and the same command
-/// continues from it.
+/// The file is written plane by plane, so memory does not limit its size. With --resume an interrupted write keeps
+/// FILE.partial, and the same command continues from it.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology export out --voxels 256 --channel rgb -o solid.nrrd")]
 pub struct Export {
@@ -35,7 +37,8 @@ pub struct Export {
     /// Voxels along the box's longest side
     #[arg(long, value_name = "N", value_parser = count)]
     pub voxels: usize,
-    /// Samples per voxel along each axis, averaged into its colour: 1 takes the colour of the centre, 4 gives smooth borders
+    /// Samples per voxel along each axis, averaged into its colour: 1 takes the colour of the centre, 4 gives smooth
+    /// borders
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = samples)]
     pub samples: usize,
     /// Channel to write

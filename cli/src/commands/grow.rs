@@ -31,13 +31,15 @@ use stereology_report::{counted, significant};
 
 /// Fills a mesh with stone that looks like an image and agrees with measurements
 ///
-/// Voxels whose centres lie inside MESH are filled outwards from seeds, the nearest first. For each voxel, the values around it in a random plane are compared
-/// with the windows of IMAGE, and the centre of a similar window is copied (Stone et al. 2014). Measured voxels keep their values; a connected component of
-/// measured voxels is one seed. The rest of the box is 0.
+/// Voxels whose centres lie inside MESH are filled outwards from seeds, the nearest first. For each voxel, the values
+/// around it in a random plane are compared with the windows of IMAGE, and the centre of a similar window is copied
+/// (Stone et al. 2014). Measured voxels keep their values; a connected component of measured voxels is one seed. The
+/// rest of the box is 0.
 ///
-/// MESH is a closed mesh (.obj, .stl, .ply), sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L or rock:SEED; or picture:H,W, which synthesises an image
-/// (-o FILE.png) by Efros and Leung's method. IMAGE is an image, or a .npy, .nrrd or .tif with any number of channels (grey and chemistry). The result has the
-/// same channels; it is u8 if IMAGE holds bytes, otherwise f32.
+/// MESH is a closed mesh (.obj, .stl, .ply), sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L or rock:SEED; or
+/// picture:H,W, which synthesises an image (-o FILE.png) by Efros and Leung's method. IMAGE is an image, or a .npy,
+/// .nrrd or .tif with any number of channels (grey and chemistry). The result has the same channels; it is u8 if IMAGE
+/// holds bytes, otherwise f32.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology grow statue.obj soapstone.png --resolution 96 --measured drilled.csv -o statue.npy"
@@ -68,16 +70,19 @@ pub struct Grow {
     /// How similar windows are found
     #[arg(long, value_enum, default_value_t = Way::Tree)]
     pub search: Way,
-    /// Iterations of a finishing pass that removes the seams between cells, as `exemplar --method best` does; measured voxels are kept. 0 skips it; 10 suffice
+    /// Iterations of a finishing pass that removes the seams between cells, as `exemplar --method best` does; measured
+    /// voxels are kept. 0 skips it; 10 suffice
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = finish)]
     pub finish: usize,
-    /// For picture:H,W: synthesise row by row on this many levels, from coarse to fine (Wei and Levoy), instead of growing
+    /// For picture:H,W: synthesise row by row on this many levels, from coarse to fine (Wei and Levoy), instead of
+    /// growing
     #[arg(long, value_name = "L", value_parser = count)]
     pub levels: Option<usize>,
     /// Also write the cell of each voxel, u32 from 1; 0 is outside the mesh
     #[arg(long, value_name = "FILE")]
     pub cells: Option<PathBuf>,
-    /// Also write the texel of IMAGE from which each voxel was copied, u32, row x width + column; 4294967295 where nothing was copied
+    /// Also write the texel of IMAGE from which each voxel was copied, u32, row x width + column; 4294967295 where
+    /// nothing was copied
     #[arg(long, value_name = "FILE")]
     pub sources: Option<PathBuf>,
     /// File for the stone: .npy, .nrrd, .vti, .tif; .png for picture:H,W
@@ -128,7 +133,8 @@ fn finish(text: &str) -> Result<usize, String> {
 /// JSON of `stereology grow`.
 #[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct GrowFields {
-    /// Visibility of the seams between cells: contrast across them over contrast inside cells; null without seams. For solids.
+    /// Visibility of the seams between cells: contrast across them over contrast inside cells; null without seams. For
+    /// solids.
     #[serde(skip_serializing_if = "Option::is_none")]
     seams: Option<Option<f64>>,
     /// Iterations of the finishing pass; with --finish.
@@ -420,7 +426,8 @@ impl Grow {
         let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let stored = match ending.as_deref() {
             Some("npy" | "nrrd" | "nhdr") => read_volume(path).at(path)?,
-            // A TIFF that holds neither bytes nor colours may hold chemistry; images use more TIFF variants than volumes.
+            // A TIFF that holds neither bytes nor colours may hold chemistry; images use more TIFF variants than
+            // volumes.
             Some("tif" | "tiff") => match read_volume(path) {
                 Ok(stored) if stored.samples.dim().3 != 4 => stored,
                 _ => return of_photo(path),

@@ -22,13 +22,14 @@ const MOST_SECTIONS: f64 = 2e7;
 
 /// Computes which profile sizes random sections through a particle give
 ///
-/// Sections SHAPE with isotropic uniform random planes and reports the distribution of the profile sizes: the K matrix of the paper (eq. 5), the mean caliper
-/// and the largest section. Spheres and ellipsoids have closed forms. For meshes the areas are integrated exactly over depth for each direction, and the
-/// standard error reports the effect of the finite number of directions. SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a
+/// Sections SHAPE with isotropic uniform random planes and reports the distribution of the profile sizes: the K matrix
+/// of the paper (eq. 5), the mean caliper and the largest section. Spheres and ellipsoids have closed forms. For meshes
+/// the areas are integrated exactly over depth for each direction, and the standard error reports the effect of the
+/// finite number of directions. SHAPE is `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a
 /// closed mesh (.obj, .stl, .ply) or any SPEC of `stereology shape`. An open or self-intersecting mesh is refused.
 ///
-/// Element (i, j) of `matrix` is the expected number of profiles in bin i from a particle at the upper edge of size bin j, per plane that hits a particle of
-/// the largest size. Column j sums to j/N.
+/// Element (i, j) of `matrix` is the expected number of profiles in bin i from a particle at the upper edge of size bin
+/// j, per plane that hits a particle of the largest size. Column j sums to j/N.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology kmatrix box:1,1,2 --bins 10 --tolerance 0.001 --json")]
 pub struct Kmatrix {
@@ -46,7 +47,8 @@ pub struct Kmatrix {
     /// How the distribution of profile sizes is computed
     #[arg(long, value_enum, default_value_t = Method::Exact)]
     pub method: Method,
-    /// Use the paper's normalisation: `caliper` is the mean caliper of the hull, which assumes one profile per intersecting plane (true for convex bodies); `paper` in the JSON compares both
+    /// Use the paper's normalisation: `caliper` is the mean caliper of the hull, which assumes one profile per
+    /// intersecting plane (true for convex bodies); `paper` in the JSON compares both
     #[arg(long)]
     pub paper: bool,
     /// Pixels along a side of the image of --method raster
@@ -64,7 +66,8 @@ pub enum Method {
     Exact,
     /// 100,000 random sections, as in the paper, with polygonal profiles
     MonteCarlo,
-    /// 100,000 random sections as in the paper: drawn as images, filled by the even-odd rule, and the largest area found taken for A_max
+    /// 100,000 random sections as in the paper: drawn as images, filled by the even-odd rule, and the largest area
+    /// found taken for A_max
     Raster,
 }
 
@@ -249,7 +252,8 @@ impl Kmatrix {
                     if reached <= asked {
                         return Ok(law);
                     }
-                    // The error falls with the square root of the number of sections; 10 % more makes one further run enough in most cases.
+                    // The error falls with the square root of the number of sections; 10 % more makes one further run
+                    // enough in most cases.
                     let needed = 1.1 * options.iterations as f64 * (reached / asked).powi(2);
                     if needed > MOST_SECTIONS {
                         return Err(Failure::run(format!(

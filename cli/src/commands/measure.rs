@@ -24,12 +24,12 @@ use stereology_report::{MeasureReport, significant};
 
 /// Measures how similar the slices of a volume are to an image, or to the slices of another volume
 ///
-/// Works on volumes from any program: .npy, .nrrd and .tif (one page per z) of any sample type, grey or RGB. Rows of EXEMPLAR run along z and its columns along
-/// x (slices xz) or along y (slices yz); rows of xy slices run along y.
+/// Works on volumes from any program: .npy, .nrrd and .tif (one page per z) of any sample type, grey or RGB. Rows of
+/// EXEMPLAR run along z and its columns along x (slices xz) or along y (slices yz); rows of xy slices run along y.
 ///
-/// Every measure is reported with its ideal (0 for a distance, 1 for a ratio, otherwise the exemplar's own value) and its floor: the difference between two
-/// halves of the exemplar. A solid at the floor is as similar to its exemplar as the exemplar's halves are to each other. Fringe lengths and tortuosities are
-/// meaningful only for layered textures.
+/// Every measure is reported with its ideal (0 for a distance, 1 for a ratio, otherwise the exemplar's own value) and
+/// its floor: the difference between two halves of the exemplar. A solid at the floor is as similar to its exemplar as
+/// the exemplar's halves are to each other. Fringe lengths and tortuosities are meaningful only for layered textures.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology measure exemplar.png solid.npy --slices xz,yz --report measures.html")]
 pub struct Measure {
@@ -43,7 +43,8 @@ pub struct Measure {
     /// Maximum number of slices per family, evenly spaced
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = count)]
     pub at_most: usize,
-    /// Values of the volume for black and white [default: 0 and 255 or 65,535 for unsigned samples; 0 and 1 for floating point within that range; otherwise the least and greatest value]
+    /// Values of the volume for black and white [default: 0 and 255 or 65,535 for unsigned samples; 0 and 1 for
+    /// floating point within that range; otherwise the least and greatest value]
     #[arg(long, value_name = "LOW,HIGH", value_parser = pair, allow_hyphen_values = true)]
     pub range: Option<[f32; 2]>,
     /// The same for the exemplar, if it is a volume or a floating-point image
@@ -52,10 +53,12 @@ pub struct Measure {
     /// Distance between fringes in pixels [default: the strongest period of the exemplar]
     #[arg(long, value_name = "PIXELS", value_parser = positive)]
     pub period: Option<f64>,
-    /// Texel from which each voxel was copied (.npy of u32: row x width + column); adds coverage and copying to the result
+    /// Texel from which each voxel was copied (.npy of u32: row x width + column); adds coverage and copying to the
+    /// result
     #[arg(long, value_name = "NPY")]
     pub sources: Option<PathBuf>,
-    /// Mask of the same size (.npy, .nrrd, .tif), not 0 inside, such as `grow --cells`; the largest rectangle inside is measured on each slice
+    /// Mask of the same size (.npy, .nrrd, .tif), not 0 inside, such as `grow --cells`; the largest rectangle inside is
+    /// measured on each slice
     #[arg(long, value_name = "FILE")]
     pub mask: Option<PathBuf>,
     /// Also write a page with all curves and images (HTML)

@@ -28,11 +28,13 @@ use stereology_report::{percent, significant};
 
 /// Packs particles of given sizes into a periodic box without overlap
 ///
-/// Sizes come from a table of number densities (`stereology unfold -o`), from a lognormal distribution, are all 1, or are listed in a table. The number of
-/// particles and the fraction of the volume they fill are met exactly. A separate pass certifies that no particles overlap. A fraction that cannot be reached
-/// is an error, which reports the remaining overlap.
+/// Sizes come from a table of number densities (`stereology unfold -o`), from a lognormal distribution, are all 1, or
+/// are listed in a table. The number of particles and the fraction of the volume they fill are met exactly. A separate
+/// pass certifies that no particles overlap. A fraction that cannot be reached is an error, which reports the remaining
+/// overlap.
 ///
-/// Writes packing.json: the box, the shapes, and for each particle its shape, size, category, position (centre of volume) and orientation (quaternion w,x,y,z).
+/// Writes packing.json: the box, the shapes, and for each particle its shape, size, category, position (centre of
+/// volume) and orientation (quaternion w,x,y,z).
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology pack --lognormal 0.3 --count 1000 --fraction 0.5 -o packing.json --also packing.vtp"
@@ -58,7 +60,8 @@ pub struct Pack {
     /// Stand-in for meshes during packing; the certificate is always for the meshes themselves
     #[arg(long, value_enum, default_value_t = Proxy::Parts)]
     pub proxy: Proxy,
-    /// Largest volume by which the convex parts of a non-convex shape can exceed it, as a fraction of its volume, 0.005 to 1
+    /// Largest volume by which the convex parts of a non-convex shape can exceed it, as a fraction of its volume, 0.005
+    /// to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub tolerance: f64,
     /// Maximum number of iterations; with --mode sequential, of positions tried for one particle
@@ -73,7 +76,8 @@ pub struct Pack {
     /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView, one point per particle); may be repeated
     #[arg(long, value_name = "FILE")]
     pub also: Vec<PathBuf>,
-    /// Also write the surfaces of the particles for ParaView; every face has the number, size, shape and category of its particle
+    /// Also write the surfaces of the particles for ParaView; every face has the number, size, shape and category of
+    /// its particle
     #[arg(long, value_name = "packing.vtp")]
     pub surfaces: Option<PathBuf>,
     /// Also write an image of the packing (PNG)

@@ -15,9 +15,9 @@ use crate::values::count;
 
 /// Decomposes an image into the sub-bands of a steerable pyramid and reports their statistics
 ///
-/// Works on the stored grey values / 255 (colour: 0.299 R + 0.587 G + 0.114 B) and treats the image as periodic. Reports for each sub-band its level (0 is
-/// the finest), orientation (null for the high-pass and low-pass residuals), shape, mean square, minimum and maximum, and the largest error when the
-/// image is reconstructed from the sub-bands.
+/// Works on the stored grey values / 255 (colour: 0.299 R + 0.587 G + 0.114 B) and treats the image as periodic.
+/// Reports for each sub-band its level (0 is the finest), orientation (null for the high-pass and low-pass residuals),
+/// shape, mean square, minimum and maximum, and the largest error when the image is reconstructed from the sub-bands.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology pyramid granite.png --levels 4 --orientations 4 --json")]
 pub struct Pyramid {

@@ -22,10 +22,12 @@ use crate::values::{Triple, count, not_negative, positive};
 
 /// Renders a finished solid: one period as a block, or a mesh carved from it
 ///
-/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn with three faces visible, as in the paper. The longest side of a mesh
-/// (.obj, .stl, .ply) spans one period of the solid, unless --period gives another length, and its surface shows the colours of the solid there.
+/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn with three faces visible, as
+/// in the paper. The longest side of a mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
+/// another length, and its surface shows the colours of the solid there.
 ///
-/// Light is traced from surface to surface. Images are free of noise at any number of samples; with 8 x 8 per pixel (--samples 8) they are unbiased.
+/// Light is traced from surface to surface. Images are free of noise at any number of samples; with 8 x 8 per pixel
+/// (--samples 8) they are unbiased.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology render out --mesh bunny.obj --up y --camera 2,1.5,3 -o bunny.png\n         stereology render out --mesh bunny.obj --up y --turntable 72 -o bunny.png; ffmpeg -i bunny_%03d.png bunny.mp4"
@@ -58,7 +60,8 @@ pub struct Render {
     /// Clear coat, from 0 (matt) to 1 (polished) [default: 0 for the block, 0.5 for a mesh]
     #[arg(long, value_name = "G", value_parser = not_negative)]
     pub gloss: Option<f64>,
-    /// Render this many images in one turn around the upright axis; _000, _001, ... is added to the name of the PNG file
+    /// Render this many images in one turn around the upright axis; _000, _001, ... is added to the name of the PNG
+    /// file
     #[arg(long, value_name = "N", value_parser = count)]
     pub turntable: Option<usize>,
     /// Image to write
@@ -209,7 +212,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Moves the mesh to the origin and scales it so that `period` (by default its longest side) is one period of the solid.
+    /// Moves the mesh to the origin and scales it so that `period` (by default its longest side) is one period of the
+    /// solid.
     pub fn of(mesh: &TriangleMesh, solid: &Solid, period: Option<f64>) -> Self {
         let fold = |start: f64, further: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
             let vertices = mesh.vertices.iter();

@@ -31,8 +31,9 @@ use crate::outputs::{check_file, write_text};
 
 /// Prints the JSON Schema of a command's --json answer
 ///
-/// The schema names every field of the JSON object with its type and meaning. A summary.json follows the same schema, without `seconds`. Without COMMAND
-/// the schemas of all commands are written into the folder DIR, as COMMAND.json; docs/schema holds them.
+/// The schema names every field of the JSON object with its type and meaning. A summary.json follows the same schema,
+/// without `seconds`. Without COMMAND the schemas of all commands are written into the folder DIR, as COMMAND.json;
+/// docs/schema holds them.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology schema unfold")]
 pub struct SchemaOf {

@@ -19,12 +19,14 @@ use stereology_report::{percent, significant};
 
 /// Finds the profiles of particles in a photograph of a plane section
 ///
-/// Separates particles from the binder (the matrix between them), outlines and measures each profile, and decomposes the photograph into mean colours and a
-/// residual texture. A photograph without separable particles (no binder colour, or no particles) is refused or gives a warning; outline the particles with
-/// another tool and import its label map with --labels.
+/// Separates particles from the binder (the matrix between them), outlines and measures each profile, and decomposes
+/// the photograph into mean colours and a residual texture. A photograph without separable particles (no binder colour,
+/// or no particles) is refused or gives a warning; outline the particles with another tool and import its label map
+/// with --labels.
 ///
-/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge, weight; colours 0 to 255), overlay.png
-/// (look at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing) and summary.json.
+/// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge,
+/// weight; colours 0 to 255), overlay.png (look at this first), binder.png, means.png, residual.tif (f32, photo / 255 -
+/// means, exact), residual.png (for viewing) and summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
 pub struct Segment {
@@ -34,8 +36,9 @@ pub struct Segment {
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Also write the labels to this file, to correct them in another tool and import them with --labels; the extension selects the format: .tif, .png, .npy
-    /// (napari), .zip (Fiji's ROI manager), .geojson (QGIS), .json (COCO); may be repeated
+    /// Also write the labels to this file, to correct them in another tool and import them with --labels; the extension
+    /// selects the format: .tif, .png, .npy (napari), .zip (Fiji's ROI manager), .geojson (QGIS), .json (COCO); may be
+    /// repeated
     #[arg(long, value_name = "FILE")]
     pub labels_out: Vec<PathBuf>,
     /// Refuse photographs with more pixels; segmentation needs about 100 bytes per pixel
@@ -50,16 +53,19 @@ pub struct Segment {
 #[command(next_help_heading = "Segmentation")]
 #[group(id = "segment-choices")]
 pub struct Choices {
-    /// Import this label map instead of segmenting: TIFF, PNG or .npy with numbers (0 = binder), GeoJSON polygons, ImageJ ROI zip, COCO annotations
+    /// Import this label map instead of segmenting: TIFF, PNG or .npy with numbers (0 = binder), GeoJSON polygons,
+    /// ImageJ ROI zip, COCO annotations
     #[arg(long, value_name = "FILE")]
     pub labels: Option<PathBuf>,
-    /// Colour of the binder, 0 to 255, or the number N, from 0, of one of the photograph's main colours [default: found in the photograph]
+    /// Colour of the binder, 0 to 255, or the number N, from 0, of one of the photograph's main colours [default: found
+    /// in the photograph]
     #[arg(long, value_name = "R,G,B|N")]
     pub binder: Option<BinderArgument>,
     /// Minimum area of a profile in pixels
     #[arg(long, value_name = "PX", value_parser = positive)]
     pub min_area: Option<f64>,
-    /// Number of colour categories of the particles, or the criterion that selects it: `silhouette` or `gap` [default: silhouette]
+    /// Number of colour categories of the particles, or the criterion that selects it: `silhouette` or `gap` [default:
+    /// silhouette]
     #[arg(long, value_name = "K|HOW")]
     pub categories: Option<CategoriesArgument>,
     /// Standard deviation of the Gaussian filter before segmentation, in pixels

@@ -17,15 +17,18 @@ use stereology_report::significant;
 
 /// Writes a shape as a mesh file
 ///
-/// SPEC is a SHAPE (`sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file), a rough rock `rock:SEED,ROUGHNESS` (0.02 is worn, 0.1
-/// jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes and exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of
-/// points `hull:FILE`, or a sphere edited by its control points (.json), which is how the particles of the paper were modelled.
+/// SPEC is a SHAPE (`sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file), a rough rock
+/// `rock:SEED,ROUGHNESS` (0.02 is worn, 0.1 jagged), a superellipsoid `superellipsoid:A,B,C,E1,E2` (semi-axes and
+/// exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of points `hull:FILE`, or a sphere edited
+/// by its control points (.json), which is how the particles of the paper were modelled.
 ///
-/// The FILE of a hull is a mesh file, whose vertices are taken, or a text file (.csv, .xyz, .txt) with one point per row: x, y, z separated by commas,
-/// semicolons, tabs or blanks. A header may name the columns x, y, z in any order; without a header the first three columns are taken. Rows that begin with
+/// The FILE of a hull is a mesh file, whose vertices are taken, or a text file (.csv, .xyz, .txt) with one point per
+/// row: x, y, z separated by commas, semicolons, tabs or blanks. A header may name the columns x, y, z in any order;
+/// without a header the first three columns are taken. Rows that begin with
 /// # are skipped.
 ///
-/// Writing a sphere or an ellipsoid to a .json file gives control points to start from. Every other command accepts the written file as SHAPE.
+/// Writing a sphere or an ellipsoid to a .json file gives control points to start from. Every other command accepts the
+/// written file as SHAPE.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Examples: stereology shape superellipsoid:1,1,0.5,0.5,0.5 -o pillow.obj\n          \
@@ -40,7 +43,8 @@ pub struct Shape {
     /// Mesh file to write: .obj, .ply (double precision), .stl (single precision); or .json for control points
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Number of subdivisions, each of which splits every triangle into four; spheres and ellipsoids start from an icosahedron [default: 0; 5 for spheres and ellipsoids]
+    /// Number of subdivisions, each of which splits every triangle into four; spheres and ellipsoids start from an
+    /// icosahedron [default: 0; 5 for spheres and ellipsoids]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=7))]
     pub subdivide: Option<u32>,
     /// Subdivision scheme: flat, or smoothed by Loop's scheme

@@ -19,8 +19,9 @@ use stereology_report::significant;
 
 /// Slices a finished solid with a plane and writes an image of the section
 ///
-/// DIR is an output folder of `stereology synthesize`. The plane is perpendicular to an --axis, at a fraction --at of the box's side (0.3 is 30 %), or it
-/// is given by a --normal and its --offset from the origin along the normal. The image shows one period of the solid.
+/// DIR is an output folder of `stereology synthesize`. The plane is perpendicular to an --axis, at a fraction --at of
+/// the box's side (0.3 is 30 %), or it is given by a --normal and its --offset from the origin along the normal. The
+/// image shows one period of the solid.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology slice out --axis z --at 0.3 --size 512 -o cut.png")]
 pub struct Slice {

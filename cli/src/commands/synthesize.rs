@@ -40,13 +40,14 @@ use stereology_report::{
 
 /// Reconstructs a solid from a photograph of a plane section, with a report on its reliability
 ///
-/// Segments PHOTO, unfolds its profiles to particles per volume, packs such particles without overlap into a periodic box, gives them the photograph's colours,
-/// and synthesises the residual texture in three dimensions. Sections of the solid are then measured, segmented like the photograph, and compared with it.
-/// Without PHOTO a built-in synthetic test image is used, so that `stereology synthesize -o out` shows every step.
+/// Segments PHOTO, unfolds its profiles to particles per volume, packs such particles without overlap into a periodic
+/// box, gives them the photograph's colours, and synthesises the residual texture in three dimensions. Sections of the
+/// solid are then measured, segmented like the photograph, and compared with it. Without PHOTO a built-in synthetic
+/// test image is used, so that `stereology synthesize -o out` shows every step.
 ///
-/// Writes into DIR: all files of `stereology segment`; densities.csv; packing.json; solid.json and texture.npy (the solid, for slice, render, export and carve);
-/// volume.npy (one period, u8 colours); cube.png; comparison.png (the photograph beside a section at the same scale); summary.json; and report.html, which is
-/// the file to open first.
+/// Writes into DIR: all files of `stereology segment`; densities.csv; packing.json; solid.json and texture.npy (the
+/// solid, for slice, render, export and carve); volume.npy (one period, u8 colours); cube.png; comparison.png (the
+/// photograph beside a section at the same scale); summary.json; and report.html, which is the file to open first.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology synthesize photo.jpg -o out --shape rock:1 --scale 0.05")]
 pub struct Synthesize {
@@ -74,7 +75,8 @@ pub struct Synthesize {
 #[command(next_help_heading = "Solid")]
 #[group(id = "solid-choices")]
 pub struct Solid {
-    /// Side of the periodic box [default: 4 x the largest particle, or the side that holds 5000 particles if that is larger]
+    /// Side of the periodic box [default: 4 x the largest particle, or the side that holds 5000 particles if that is
+    /// larger]
     #[arg(long = "box", value_name = "L", value_parser = positive, conflicts_with = "count")]
     pub side: Option<f64>,
     /// Number of particles, instead of --box
@@ -97,7 +99,8 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
-/// Largest number of voxels along a side; more would take longer than the rest of the synthesis and are left to `export`.
+/// Largest number of voxels along a side; more would take longer than the rest of the synthesis and are left to
+/// `export`.
 const MOST_VOXELS: usize = 2048;
 /// Ten bins would leave steps in the profile sizes of the solid's sections; the report shows confidence intervals.
 const DEFAULTS: Defaults = Defaults {
@@ -106,7 +109,8 @@ const DEFAULTS: Defaults = Defaults {
 };
 /// White between photograph and section in comparison.png, in pixels.
 const GAP: u32 = 8;
-/// Normals of the sections in the report, and their offsets as fractions of the box's side; oblique, so that the period is not visible.
+/// Normals of the sections in the report, and their offsets as fractions of the box's side; oblique, so that the period
+/// is not visible.
 const SECTIONS: [([f64; 3], f64); 2] = [([1.0, 2.0, 3.0], 0.37), ([-3.0, 2.0, 1.5], 0.61)];
 
 /// JSON of `stereology synthesize`.
@@ -188,7 +192,8 @@ impl VerdictFields {
 pub struct UnfoldedPhoto {
     #[serde(flatten)]
     all: UnfoldingFields,
-    /// Probability of such an association of size and colour if they are independent; null if there is one colour category.
+    /// Probability of such an association of size and colour if they are independent; null if there is one colour
+    /// category.
     size_and_colour_p_value: Option<f64>,
 }
 

@@ -27,13 +27,14 @@ use crate::warnings::Warning;
 
 /// Synthesises a periodic texture image or volume from an example image
 ///
-/// Heeger-Bergen synthesis with a steerable pyramid. --size N or NZ,NY,NX gives a volume whose slices all look like IMAGE; --size H,W gives an image. The result
-/// has any size and repeats without a seam. The method suits textures without large structures (stone, sand, paste); for materials with particles use
-/// `stereology synthesize`.
+/// Heeger-Bergen synthesis with a steerable pyramid. --size N or NZ,NY,NX gives a volume whose slices all look like
+/// IMAGE; --size H,W gives an image. The result has any size and repeats without a seam. The method suits textures
+/// without large structures (stone, sand, paste); for materials with particles use `stereology synthesize`.
 ///
-/// Two or three images give a volume that looks different along its axes (--mode oriented): the first shows slices normal to z (rows along y, columns along
-/// x), the second slices normal to y (rows along z, columns along x), the third slices normal to x (rows along z, columns along y). If there are two, the
-/// second is used for y and x. All images must have the same scale.
+/// Two or three images give a volume that looks different along its axes (--mode oriented): the first shows slices
+/// normal to z (rows along y, columns along x), the second slices normal to y (rows along z, columns along x), the
+/// third slices normal to x (rows along z, columns along y). If there are two, the second is used for y and x. All
+/// images must have the same scale.
 ///
 /// Writes u8 colours: .png (image), .npy, .nrrd, .vti, .tif, .h5 or .zarr (volume).
 #[derive(Args, Debug)]

@@ -1,4 +1,5 @@
-//! Solids from pictures: what is given stays, what is masked stays empty, phases keep their fractions, mistakes are told.
+//! Solids from pictures: what is given stays, what is masked stays empty, phases keep their fractions, mistakes are
+//! told.
 
 use std::fs;
 use std::path::Path;

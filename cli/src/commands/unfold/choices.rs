@@ -26,7 +26,8 @@ pub struct Defaults {
 #[command(next_help_heading = "Unfolding")]
 #[group(id = "unfold-choices")]
 pub struct Choices {
-    /// Number of size bins between 0 and the largest size; auto: as many as hold five profiles each, at most 2 n^(1/3) for n profiles [default: 10; 16 for synthesize, because sections of the solid show the steps of coarser bins]
+    /// Number of size bins between 0 and the largest size; auto: as many as hold five profiles each, at most 2 n^(1/3)
+    /// for n profiles [default: 10; 16 for synthesize, because sections of the solid show the steps of coarser bins]
     #[arg(long, value_name = "N|auto", conflicts_with = "edges")]
     pub bins: Option<BinCount>,
     /// Edges of the size bins, instead of --bins
@@ -38,13 +39,15 @@ pub struct Choices {
     /// Shape of the particles, and its fraction of their number; may be repeated [default: sphere]
     #[arg(long, value_name = "SHAPE[=F]")]
     pub shape: Vec<ShapeShare>,
-    /// Largest particle size: a length, `profile` (size of the largest profile), `corrected` (the same, corrected for its bias) or `likelihood` (most likely size) [default: profile]
+    /// Largest particle size: a length, `profile` (size of the largest profile), `corrected` (the same, corrected for
+    /// its bias) or `likelihood` (most likely size) [default: profile]
     #[arg(long, value_name = "D", conflicts_with = "edges")]
     pub max_size: Option<MaxSize>,
     /// Detection limit: smaller profiles are ignored and smaller particles are not estimated
     #[arg(long, value_name = "T", value_parser = positive)]
     pub min_size: Option<f64>,
-    /// Capping angle in degrees (Keiding and Jensen): a particle of size D shows no profile smaller than D times the sine of this angle; fit: the most likely angle
+    /// Capping angle in degrees (Keiding and Jensen): a particle of size D shows no profile smaller than D times the
+    /// sine of this angle; fit: the most likely angle
     #[arg(long, value_name = "DEGREES|fit")]
     pub capping_angle: Option<CappingAngle>,
     /// Method of estimation

@@ -9,11 +9,14 @@ use crate::failure::Failure;
 /// Rules for profiles at the edges of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EdgeRule {
-    /// Profiles entirely inside have the weight W H / ((W - w)(H - h)), where w and h are the sides of their bounding box (Miles-Lantuejoul)
+    /// Profiles entirely inside have the weight W H / ((W - w)(H - h)), where w and h are the sides of their bounding
+    /// box (Miles-Lantuejoul)
     MilesLantuejoul,
-    /// Counting frame: profiles that touch the left or the upper edge are excluded; sizes must be those of whole profiles
+    /// Counting frame: profiles that touch the left or the upper edge are excluded; sizes must be those of whole
+    /// profiles
     Frame,
-    /// Plus sampling: profiles with the centre of their bounding box inside count; profiles must be known beyond the edges
+    /// Plus sampling: profiles with the centre of their bounding box inside count; profiles must be known beyond the
+    /// edges
     Plus,
     /// All profiles count, truncated ones too: biased, for comparison
     All,

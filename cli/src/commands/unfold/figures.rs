@@ -7,7 +7,8 @@ use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, Ty
 
 use crate::warnings::Record;
 
-/// Number densities and what follows from them: most of the JSON of `stereology unfold`, and `unfold` in that of `stereology synthesize`.
+/// Number densities and what follows from them: most of the JSON of `stereology unfold`, and `unfold` in that of
+/// `stereology synthesize`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct UnfoldingFields {
     /// Edges of the size bins.

@@ -38,18 +38,20 @@ const DEFAULTS: Defaults = Defaults {
 
 /// Estimates the number and sizes of particles in a solid from the profiles on a plane section
 ///
-/// Reads a table of profiles (CSV with a header) and reports the number of particles per unit volume in each size bin. The expected profile counts (refolded)
-/// are reported beside the observed counts, so that the fit can be examined.
+/// Reads a table of profiles (CSV with a header) and reports the number of particles per unit volume in each size bin.
+/// The expected profile counts (refolded) are reported beside the observed counts, so that the fit can be examined.
 ///
-/// PROFILES.csv has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of --shape), `category`, `weight` (multiplies
-/// the count) and `slice` are used if present; other columns are ignored. `stereology segment` writes such a table as profiles.csv. --area is the total area
-/// examined, which absolute numbers require. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs the bounding box of each
-/// profile in the columns `left`, `top`, `right`, `bottom`, and the size of a slice.
+/// PROFILES.csv has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of
+/// --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; other columns are ignored.
+/// `stereology segment` writes such a table as profiles.csv. --area is the total area examined, which absolute numbers
+/// require. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs the bounding box
+/// of each profile in the columns `left`, `top`, `right`, `bottom`, and the size of a slice.
 ///
 /// --scale multiplies all lengths, in the table and in the options.
 ///
-/// Several --shape without a `type` column share one size distribution in the given fractions (eqs. 10-12); with a `type` column each type has its own (eq. 9).
-/// Several categories are also unfolded separately, with the same bins, and summed.
+/// Several --shape without a `type` column share one size distribution in the given fractions (eqs. 10-12); with a
+/// `type` column each type has its own (eq. 9). Several categories are also unfolded separately, with the same bins,
+/// and summed.
 #[derive(Args, Debug)]
 #[command(
     after_long_help = "Example: stereology unfold out/profiles.csv --area 307200 --bins 10 --shape rock:1 -o densities.csv"
@@ -69,7 +71,8 @@ pub struct Unfold {
     /// Maximum number of iterations of em and ems [default: 100000]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Unfolding")]
     pub iterations: Option<usize>,
-    /// Rule for profiles at the edges, instead of the column `weight`; needs the columns left, top, right, bottom and --window (for all and inside the column touches_edge suffices)
+    /// Rule for profiles at the edges, instead of the column `weight`; needs the columns left, top, right, bottom and
+    /// --window (for all and inside the column touches_edge suffices)
     #[arg(long, value_enum, help_heading = "Unfolding")]
     pub edge_rule: Option<EdgeRule>,
     /// Width and height of a slice, for --edge-rule

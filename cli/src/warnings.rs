@@ -42,6 +42,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing, or repair the mesh if this is not intended.",
     ),
     (
+        "duplicate-rows",
+        "Many sizes of profiles occur more than once, more often than their resolution explains: rows of the table were probably repeated.",
+        "Remove the repeated rows: they make intervals too narrow and densities too large.",
+    ),
+    (
         "edge-heavy",
         "Many profiles touch the edge of the photograph.",
         "Take a photograph of a larger area: it should be at least ten times as wide as the largest profile.",
@@ -82,6 +87,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
     ),
     (
+        "impossible-area",
+        "The profiles cover more than the examined area, or one profile is larger than it.",
+        "Check --area and its unit, and whether the sizes are diameters or areas.",
+    ),
+    (
         "largest-uncorrected",
         "The largest profiles all have the same size, so the largest particle size could not be extrapolated; the size of the largest profile was used.",
         "Give --max-size as a length, or omit it.",
@@ -110,6 +120,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "mesh-repaired",
         "The mesh was not quite a closed surface and was repaired.",
         "Read `repairs`; repair the mesh yourself if they are not intended.",
+    ),
+    (
+        "missing-fines",
+        "There are no profiles below the smallest one, where sections of the larger particles alone would show some: small profiles were not detected.",
+        "Give the smallest size that is detected reliably with --min-size.",
     ),
     (
         "near-minimum",
@@ -147,6 +162,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Use the number of --bins that the message names, --method auto, or photographs of a larger area.",
     ),
     (
+        "outlier",
+        "The largest profile is far larger than the next ones.",
+        "Check whether it is a profile of a particle; if not, remove it.",
+    ),
+    (
         "overlapping-labels",
         "Outlines of the label file overlap; pixels in several outlines were assigned to the smallest.",
         "Correct the outlines in the tool that made them if this is not intended.",
@@ -157,9 +177,19 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Omit --paper for densities; use it only for comparison with the paper.",
     ),
     (
+        "poor-fit",
+        "No size distribution of particles of this shape explains the profiles.",
+        "Try another --shape; check the edge rule, the detection limit (--min-size) and the segmentation.",
+    ),
+    (
         "range-guessed",
         "The samples of a volume do not define which value is white; the range was taken from the data.",
         "Give --range LOW,HIGH (or --exemplar-range) if black and white have other values.",
+    ),
+    (
+        "rounded-sizes",
+        "The sizes of the profiles are rounded to coarse steps, or all equal.",
+        "Use sizes that are not rounded.",
     ),
     (
         "seeds-added",

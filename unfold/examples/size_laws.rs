@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 use std::time::Instant;
 use stereology_unfold::{
     Bootstrap, Estimate, Method, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel, equal_edges,
-    fitting_edges, fitting_profile_edges, unfold,
+    fitting_edges, fitting_profile_edges, profile_findings, unfold,
 };
 
 const LAWS: [&str; 16] = [
@@ -214,7 +214,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let replicates = arguments.next().map_or(Ok(200), |text| text.parse())?;
     println!(
-        "law           profiles |   total          |   mean size      |   volume frac.   |  A_A   | bins    L1  sparse   ms"
+        "law           profiles |   total          |   mean size      |   volume frac.   |  A_A   | bins    L1  sparse alarms ms"
     );
     for name in LAWS {
         if wanted
@@ -228,7 +228,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let expected: f64 = expected.parse()?;
             let (mut total, mut mean, mut volume) = (Tally::default(), Tally::default(), Tally::default());
             let (mut bins_held, mut bins, mut sparse, mut seconds) = (0_u32, 0_u32, 0_usize, 0.0);
-            let (mut distance, mut area_fraction) = (0.0, 0.0);
+            let (mut distance, mut area_fraction, mut alarms) = (0.0, 0.0, 0_usize);
             for repeat in 0..repeats {
                 let mut rng = ChaCha8Rng::seed_from_u64(11 + 1000 * repeat);
                 rng.set_stream(expected as u64);
@@ -240,6 +240,17 @@ fn main() -> Result<(), Box<dyn Error>> {
                 mean.add(found.mean_size, law.mean);
                 volume.add(found.volume_fraction, PI / 6.0 * law.cube);
                 area_fraction += found.area_fraction.observed / (PI / 6.0 * law.cube) - 1.0;
+                // Findings that something is wrong with data or model. V_V is above 1 for some distributions by
+                // construction.
+                let wrong = [
+                    "poor-fit",
+                    "missing-fines",
+                    "outlier",
+                    "rounded-sizes",
+                    "duplicate-rows",
+                ];
+                let data = profile_findings(&sizes, None, f64::MAX);
+                alarms += usize::from(found.findings.iter().chain(&data).any(|of| wrong.contains(&of.code)));
                 sparse += usize::from(found.method.name() == "sparse");
                 for (bin, density) in found.edges.windows(2).zip(&found.number_density) {
                     let truth = law.fraction(bin[0], bin[1]);
@@ -256,7 +267,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
             println!(
-                "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.3} {sparse:3}/{repeats:3}  {:.1}",
+                "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.3} {sparse:3}/{repeats:3} {alarms:3} {:.1}",
                 law.name,
                 expected,
                 total.show(),

@@ -79,6 +79,7 @@ mod estimate;
 mod estimator;
 mod expectation_maximisation;
 mod findings;
+mod goodness;
 mod grid;
 mod inverse;
 mod kernel;
@@ -90,6 +91,7 @@ mod particle_types;
 mod penalised;
 mod problem;
 mod profile_counts;
+mod profile_findings;
 mod profile_likelihood;
 mod quantiles;
 mod size_bins;
@@ -108,6 +110,7 @@ pub use largest_size::{LargestSize, largest_size};
 pub use options::{Bootstrap, Method, Resampling, UnfoldOptions};
 pub use particle_types::{TypesUnfolding, unfold_types, unfold_types_with_progress};
 pub use profile_counts::{ProfileCounts, ProfilesError};
+pub use profile_findings::profile_findings;
 pub use profile_likelihood::{LikelyParameter, likely_parameter};
 pub use size_bins::{
     ReportedEdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges,

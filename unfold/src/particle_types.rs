@@ -43,8 +43,9 @@ impl TypesUnfolding {
         self.types.iter_mut().for_each(|of| of.rebin_profiles(edges));
     }
 
-    /// All types as one unfolding, eq. (9): densities, totals and intervals are those of the sum. Method, penalty, evidence and threshold are those of the
-    /// first type; deviance and degrees of freedom are summed; findings stay with their types.
+    /// All types as one unfolding, eq. (9): densities, totals and intervals are those of the sum. Method, penalty,
+    /// evidence and threshold are those of the first type; deviance and degrees of freedom are summed; findings stay
+    /// with their types.
     #[must_use]
     pub fn summed(&self) -> Unfolding {
         let mut sum = self.types[0].clone();
@@ -66,9 +67,12 @@ impl TypesUnfolding {
             }
             sum.deviance += part.deviance;
             sum.degrees_of_freedom += part.degrees_of_freedom;
+            sum.p_value = [sum.p_value, part.p_value].into_iter().flatten().reduce(f64::min);
             sum.condition_number = sum.condition_number.max(part.condition_number);
             sum.clamped_bins.extend(&part.clamped_bins);
         }
+        // The smallest of several p-values, corrected for their number.
+        sum.p_value = sum.p_value.map(|p| (p * self.types.len() as f64).min(1.0));
         sum
     }
 }

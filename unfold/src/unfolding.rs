@@ -4,6 +4,7 @@ use crate::bootstrap::{Deviation, Replicates, Source, replicate, slices_drawn};
 use crate::estimate::{CrossCheck, Estimate, Interval};
 use crate::estimator::{Fit, again, estimate, workspace};
 use crate::findings::findings;
+use crate::goodness::{missing_fines, p_value, poor_fit};
 use crate::kernel::{Kernel, condition_number};
 use crate::options::{Bootstrap, Method, UnfoldOptions};
 use crate::problem::Problem;
@@ -63,6 +64,9 @@ pub struct Unfolding {
     pub deviance: f64,
     /// Profile bins less parameters in effect, not below zero.
     pub degrees_of_freedom: usize,
+    /// Goodness of fit: the probability of counts as far from the refolded ones as these, or farther, if the model is
+    /// right (Pearson's χ² over bins pooled to five expected profiles). `None` without a degree of freedom.
+    pub p_value: Option<f64>,
     /// Condition number of the kernel of the reported bins.
     pub condition_number: f64,
     /// The threshold that was used: the lowest profile size of the fit.
@@ -319,6 +323,13 @@ fn result(
     // Not cut at 1: a fraction above 1 says that area, sizes or shape are wrong.
     let volume_fraction = quantities.estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
     let rows = problem.counts.len();
+    let expected = problem.refold(&fit.densities);
+    let p_value = p_value(&problem.counts, &expected, fit.parameters);
+    let mut findings = findings(problem, counts, kernel, options, fit, &coarse);
+    findings.extend(poor_fit(p_value));
+    findings.extend(missing_fines(&problem.counts, &expected, |row| {
+        counts.edges()[problem.first_row + row]
+    }));
     Unfolding {
         edges: sizes.reported_edges().to_vec(),
         intervals: replicates.map(|_| intervals),
@@ -349,7 +360,8 @@ fn result(
             },
         },
         volume_fraction,
-        deviance: deviance(&problem.counts, &problem.refold(&fit.densities)),
+        deviance: deviance(&problem.counts, &expected),
+        p_value,
         degrees_of_freedom: degrees_of_freedom(rows, fit.parameters),
         condition_number: condition_number(&problem.coarse),
         threshold: problem.threshold,
@@ -363,7 +375,7 @@ fn result(
         }),
         clamped_bins: fit.negative.iter().map(|&(k, _)| problem.reported[k]).collect(),
         iterations: fit.iterations,
-        findings: findings(problem, counts, kernel, options, fit, &coarse),
+        findings,
         number_density,
         refolded,
     }

@@ -9,7 +9,9 @@ use crate::pipeline::{
 };
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
-use stereology_unfold::{TypesUnfolding, UnfoldOptions, Unfolding, unfold_types_with_progress, unfold_with_progress};
+use stereology_unfold::{
+    TypesUnfolding, UnfoldOptions, Unfolding, profile_findings, unfold_types_with_progress, unfold_with_progress,
+};
 
 /// Particles per volume: all together, by particle type, by colour category; and what was chosen on the way.
 #[derive(Clone, Debug)]
@@ -139,7 +141,7 @@ pub fn unfold_profiles(
         _ => fractions_by_category(profiles, &all, &by_colour),
     };
     Ok(ParticleDensities {
-        findings: findings(&all, &by_type, counted.len(), &fitting.settled, options),
+        findings: findings(profiles, &all, &by_type, counted.len(), &fitting.settled, options),
         by_type,
         categories,
         by_category,
@@ -321,6 +323,7 @@ fn fractions_by_category(
 }
 
 fn findings(
+    profiles: &MeasuredProfiles,
     all: &Unfolding,
     by_type: &[Unfolding],
     counted: usize,
@@ -328,6 +331,11 @@ fn findings(
     options: &DensityOptions,
 ) -> Vec<Finding> {
     let mut findings = all.findings.clone();
+    findings.extend(profile_findings(
+        &profiles.sizes,
+        Some(&profiles.weights),
+        profiles.area,
+    ));
     for (kind, part) in by_type.iter().enumerate() {
         let of_type = |finding: &Finding| Finding::new(finding.code, format!("type {kind}: {}", finding.message));
         findings.extend(part.findings.iter().map(of_type));

@@ -11,5 +11,6 @@ mod experiment;
 mod figure_7;
 mod incomplete;
 mod intervals;
+mod misfit;
 mod round_trips;
 mod spheres;

@@ -40,6 +40,8 @@ pub struct UnfoldingFields {
     deviance: f64,
     /// Degrees of freedom of the deviance.
     degrees_of_freedom: usize,
+    /// Goodness of fit: probability of counts at least as far from the expected ones, if the model is right; null without a degree of freedom.
+    p_value: Option<f64>,
     /// Condition number of the kernel.
     condition_number: f64,
     /// Weight of the smoothness penalty; null without one.
@@ -192,6 +194,7 @@ impl UnfoldingFields {
             refolded: found.profiles_in(&found.edges, &found.refolded),
             deviance: found.deviance,
             degrees_of_freedom: found.degrees_of_freedom,
+            p_value: found.p_value,
             condition_number: found.condition_number,
             penalty: found.penalty.map(|penalty| penalty.weight),
             penalty_order: found.penalty.map(|penalty| penalty.order),

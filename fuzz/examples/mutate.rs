@@ -1,5 +1,5 @@
-//! Random changes of small mesh files and of raw meshes, for so many seconds: `mutate [SECONDS] [SEED]`. A case that
-//! fails is left in `mutate-failure.bin`, the target's name first.
+//! Random changes of small mesh files and of raw meshes, for a number of seconds: `mutate [SECONDS] [SEED]`. A case
+//! that fails is written to `mutate-failure.bin`, and its target is printed.
 
 use std::panic::catch_unwind;
 use std::time::{Duration, Instant};
@@ -37,7 +37,7 @@ fn main() {
     println!("{cases} cases in {seconds} s without a panic; the slowest took {slowest:?}");
 }
 
-/// Small meshes of every format and kind.
+/// Small meshes in every format.
 fn corpus() -> Vec<(&'static str, Vec<u8>)> {
     let folder = std::env::temp_dir().join(format!("stereology-mutate-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for the corpus");
@@ -92,7 +92,7 @@ fn text_ply(mesh: &TriangleMesh) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The form that the target `sweep` takes.
+/// The bytes that the target `sweep` interprets as this mesh.
 fn raw(mesh: &TriangleMesh, kind: u8) -> Vec<u8> {
     let mut bytes = vec![u8::try_from(mesh.vertices.len()).unwrap_or(255), kind];
     for p in &mesh.vertices {
@@ -108,7 +108,7 @@ fn raw(mesh: &TriangleMesh, kind: u8) -> Vec<u8> {
     bytes
 }
 
-/// A few changes: bytes, words of numbers, pieces doubled, dropped, swapped, the end cut off.
+/// Makes a few changes: bytes and numbers replaced, parts duplicated, removed or swapped, the end truncated.
 fn mutated(from: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     const WORDS: [&[u8]; 14] = [
         b"nan", b"inf", b"-1", b"0", b"1e308", b"1e-308", b"4294967295", b"99999999999999999999", b"f 1 2 3 4 5 6", b"\\\n", b"//", b"\xff\xff\xff\xff",

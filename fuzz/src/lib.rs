@@ -1,9 +1,9 @@
-//! What may be asked of any bytes: an error or a result, never a panic, a hang or a number that is none.
+//! Properties that hold for any input bytes: an error or a result, never a panic, an endless loop or NaN.
 //!
 //! `cargo +nightly fuzz run mesh_file --features libfuzzer` (cargo-fuzz; `-s none` without sanitizers) drives these
-//! functions with coverage, from the small corpus beside; `cargo run --release --example mutate -- SECONDS` drives them
-//! with random changes of small meshes, and needs neither. `cargo run --release --example replay -- corpus/*/*` runs
-//! the corpus, former failures among it.
+//! functions guided by coverage, from the small corpus in this folder. `cargo run --release --example mutate --
+//! SECONDS` drives them with random changes of small meshes and needs neither nightly nor cargo-fuzz. `cargo run
+//! --release --example replay -- corpus/*/*` runs the corpus, which includes former failures.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use nalgebra::{Point3, Vector3};
 use stereology_kmatrix::{SectionLaw, SectionOptions};
 use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TriangleMesh, convex_hull, parse_points};
 
-/// Meshes beyond this are read and checked, but not swept: time goes to small ones.
+/// Meshes of more triangles are read and checked, but not swept, to spend the time on small ones.
 const MOST_SWEPT: usize = 400;
 
-/// Reads the bytes as every format of mesh file, and sweeps what encloses a solid.
+/// Reads the bytes as every mesh file format, and sweeps meshes that enclose a solid.
 pub fn mesh_file(bytes: &[u8]) {
     for format in [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply] {
         if let Ok(mesh) = format.parse(bytes, Path::new("bytes")) {
@@ -33,8 +33,8 @@ pub fn mesh_file(bytes: &[u8]) {
     }
 }
 
-/// Takes the bytes for a mesh: how many vertices, coordinates of a byte each (so that many lie in common planes, on
-/// common lines and at common places) or of eight, and triangles of three bytes.
+/// Interprets the bytes as a mesh: the number of vertices; coordinates of one byte each (so that many vertices are
+/// coplanar, collinear or equal) or of eight; and triangles of three bytes.
 pub fn sweep(bytes: &[u8]) {
     let [count, kind, rest @ ..] = bytes else { return };
     let wide = kind % 4 == 0;

@@ -1,11 +1,11 @@
 //! Pictures of what the rooms make together: a packing, a mesh carved from a solid, lit as by [`render`](crate::render).
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
 use stereology_anneal::Packing;
+use stereology_metrics::Progress;
 use stereology_render::{Camera, Material, RenderError, RenderOptions, render_material, render_mesh};
 use stereology_shape::{BodyKind, Particle, TriangleMesh, UnitBody};
 use stereology_volume::Solid;
@@ -41,7 +41,7 @@ pub fn picture_of_solid(
     place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
     camera: &Camera,
     options: &RenderOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<RgbImage, RenderError> {
     let colour = |p: &Point3<f64>| solid.colour_at(&place(p));
     let voids = |p: &Point3<f64>| solid.void_distance_at(&place(p));

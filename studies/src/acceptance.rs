@@ -1,6 +1,6 @@
-//! The released program on real photographs and on drawn ones whose truth is known: a table for docs/acceptance.md.
+//! The released program on real photographs and on synthetic test images with known true values: docs/acceptance.md.
 //!
-//! The photographs stay outside the project; only this table of what was measured on them is kept.
+//! The photographs are not part of the project; only the results are kept.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,12 +17,12 @@ use stereology::shape::{Body, UnitBody};
 struct Case {
     /// File in the folder of images.
     photo: &'static str,
-    /// Label map to import, if any.
+    /// Label map to import, if there is one.
     labels: Option<&'static str>,
     shape: &'static str,
     /// Further options.
     options: &'static [&'static str],
-    /// Truth beside it.
+    /// File of true values in the same folder.
     truth: Option<&'static str>,
 }
 
@@ -58,7 +58,7 @@ const CASES: [Case; 7] = [
     case("sandstone_thin_section_miocene.jpg", "rock:1"),
 ];
 
-/// Photographs segmented on their own; those with a label map beside them are scored.
+/// Images that are only segmented; those with a label map in the same folder are scored.
 const SEGMENTED: [&str; 14] = [
     "synth_easy_101.jpg",
     "synth_medium_102.jpg",
@@ -76,12 +76,12 @@ const SEGMENTED: [&str; 14] = [
     "pebbles_torrey_pines.jpg",
 ];
 
-/// Segments every photograph with `program` and scores it against its label map, if it has one.
+/// Segments every image with `program` and scores it against its label map, if it has one.
 fn segmentation(program: &Path, images: &Path, results: &Path) -> Result<String> {
     let mut text = String::from(
         "\nSegmentation against label maps (average precision at overlaps of 1/2 and 3/4, area and count relative to the truth, Kolmogorov-Smirnov distance of sizes; profiles of at least 20 pixels). \
-         The conglomerates, gravel, pebbles and the dark stone have no binder that colour could tell: they are to be refused or warned of.\n\n\
-         | photograph | profiles | area | AP50 | AP75 | area error | count error | KS | warnings |\n|---|---|---|---|---|---|---|---|---|\n",
+         The conglomerates, gravel, pebbles and the dark stone have no binder that colour distinguishes: they must be refused or give warnings.\n\n\
+         | image | profiles | area fraction | AP50 | AP75 | area error | count error | KS | warnings |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for photo in SEGMENTED {
         let stem = photo.split('.').next().unwrap_or(photo);
@@ -97,7 +97,7 @@ fn segmentation(program: &Path, images: &Path, results: &Path) -> Result<String>
         if !answer.status.success() {
             writeln!(
                 text,
-                "| {photo} | refused: nothing stands out from a binder | | | | | | | |"
+                "| {photo} | refused: no particles distinguishable from a binder | | | | | | | |"
             )?;
             continue;
         }
@@ -134,22 +134,25 @@ fn segmentation(program: &Path, images: &Path, results: &Path) -> Result<String>
 
 const STEPS: [&str; 5] = ["segment", "unfold", "pack", "texture", "verify"];
 
-/// Runs every case with `program`, its results into `results`, and writes the table to `table`.
+/// Runs every case with `program`, writes the solids to `results` and the tables to the page `table`.
 pub fn run(program: &Path, data: &Path, results: &Path, table: &Path) -> Result<()> {
     if !program.is_file() {
-        bail!("{}: build it first, cargo build --release", program.display());
+        bail!(
+            "{}: does not exist; build it with cargo build --release",
+            program.display()
+        );
     }
     fs::create_dir_all(results)?;
     let images = data.join("images");
     let mut text = String::from(
-        "# Acceptance on photographs\n\nMade by `cargo xtask acceptance --data FOLDER` with the released program; the photographs are not part of the project.\n\n\
-         | photograph | shape | profiles | area photo | area solid | size W1 exact | size W1 again | colour | warnings |\n|---|---|---|---|---|---|---|---|---|\n",
+        "# Acceptance\n\nWritten by `cargo xtask acceptance --data FOLDER` with the released program, on photographs and synthetic test images (`synth_*`); the images are not part of the project.\n\n\
+         | image | shape | profiles | area fraction, image | area fraction, solid | size W1, exact profiles | size W1, segmented again | colour difference | warnings |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     let mut times = String::from(
-        "\nSeconds by step, two cores:\n\n| photograph | segment | unfold | pack | texture | verify | particles |\n|---|---|---|---|---|---|---|\n",
+        "\nSeconds per step, two cores:\n\n| image | segment | unfold | pack | texture | verify | particles |\n|---|---|---|---|---|---|---|\n",
     );
     let mut truths = String::from(
-        "\nDrawn photographs against their truth (sizes as equal-volume diameters, converted by the assumed shape's ratio):\n\n| photograph | density / true | mean size / true | volume fraction / true |\n|---|---|---|---|\n",
+        "\nSynthetic test images against their true values (sizes as equal-volume diameters, converted by the ratio of the assumed shape):\n\n| image | density / true | mean size / true | volume fraction / true |\n|---|---|---|---|\n",
     );
     for case in &CASES {
         println!("{}", case.photo);
@@ -211,7 +214,7 @@ pub fn run(program: &Path, data: &Path, results: &Path, table: &Path) -> Result<
         )?;
         if let Some(truth) = case.truth {
             let truth: BTreeMap<String, Value> = serde_json::from_slice(&fs::read(images.join(truth))?)?;
-            // The size of a body is that of its largest section; equal volume is another diameter.
+            // The size of a particle is that of its largest section; the true sizes are equal-volume diameters.
             let ratio = (6.0 * UnitBody::new(&Body::parse(case.shape)?).volume() / std::f64::consts::PI).cbrt();
             let over = |found: &Value, truth: &Value, factor: f64| match (found.as_f64(), truth.as_f64()) {
                 (Some(found), Some(truth)) => format!("{:.3}", factor * found / truth),

@@ -1,4 +1,5 @@
-//! Acceptance of `exemplar` on pictures outside the project: likeness, speed and the study of urs-2012, into docs/exemplar.md.
+//! Acceptance of `exemplar` on images outside the project: similarity, speed and the study of urs-2012, for
+//! docs/exemplar.md.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,7 +13,7 @@ use serde_json::Value;
 use crate::laminar_study::{HEAD, band_passed, table};
 use crate::texture_table::replace_between;
 
-/// A command's JSON answer, its CPU seconds and its peak memory in MB, by GNU time.
+/// A command's JSON result, its CPU seconds and its peak memory in MB, by GNU time.
 pub fn timed(program: &Path, arguments: &[&str]) -> Result<(Value, f64, f64)> {
     let output = Command::new("/usr/bin/time")
         .args(["-f", "%U %S %M"])
@@ -37,7 +38,7 @@ pub fn timed(program: &Path, arguments: &[&str]) -> Result<(Value, f64, f64)> {
     ))
 }
 
-/// Solids of the best method beside their pictures, and its speed.
+/// Compares solids of the best method with their exemplars, and measures its speed.
 pub fn solids(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<()> {
     fs::create_dir_all(results)?;
     let mut text = String::from(
@@ -84,7 +85,7 @@ pub fn solids(program: &Path, data: &Path, results: &Path, page: &Path) -> Resul
                 .map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"))
         };
         let floored = |key: &str| format!("{} ({})", number(key), number(&format!("{key}_floor")));
-        // A map of phases has a mean for its fraction.
+        // The mean of a phase map is its phase fraction.
         let off = if made["phases"] == true {
             let values = stereology::grid::read_npy::<u8>(&solid)?;
             let share = values.iter().filter(|v| **v > 127).count() as f64 / values.len() as f64;
@@ -118,7 +119,7 @@ pub fn solids(program: &Path, data: &Path, results: &Path, page: &Path) -> Resul
     replace_between(page, marks, &text)
 }
 
-/// The study of urs-2012 on pictures outside the project, raw and band-passed, 128³ as there, one seed.
+/// The study of urs-2012 on images outside the project, raw and band-passed, 128³ as in the paper, one seed.
 pub fn laminar(data: &Path, page: &Path) -> Result<()> {
     let mut text = format!("\n{HEAD}");
     for name in ["fringe_synth_a_xz", "hrtem_soot_a_128"] {

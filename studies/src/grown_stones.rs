@@ -1,4 +1,5 @@
-//! Acceptance of `grow` on meshes and of `measure` on volumes outside the project: tables for docs/grow.md and docs/measure.md.
+//! Acceptance of `grow` on meshes and of `measure` on volumes outside the project: tables for docs/grow.md and
+//! docs/measure.md.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -70,7 +71,7 @@ pub fn grow(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<
     replace_between(page, MARKS, &text)
 }
 
-/// Blocks of stone with and without a finishing pass: seams, likeness, and measurements that stay.
+/// Blocks of stone with and without a finishing pass: seams, similarity, and preservation of the measurements.
 fn finishing(program: &Path, data: &Path, results: &Path) -> Result<String> {
     let mut text = String::from(
         "\n| block of 64³ | window | finish | steps across seams / inside | SWD 7 (floor) | SWD 16 (floor) | gradient | KL grey | changed | CPU µs a voxel |\n|---|---|---|---|---|---|---|---|---|---|\n",
@@ -136,7 +137,8 @@ fn finishing(program: &Path, data: &Path, results: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Measures the CT volume of sand: its slices beside one of its own slices, halves beside each other, and the binary of its labels.
+/// Measures the CT volume of sand: its slices against one of them, its halves against each other, and the binary of its
+/// labels.
 pub fn measure(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<()> {
     fs::create_dir_all(results)?;
     let mut text = String::from(

@@ -1,4 +1,4 @@
-//! The study of urs-2012: methods and scans on one laminar picture, judged iteration by iteration and at the end.
+//! The study of urs-2012: methods and scans on one laminar image, evaluated at each iteration and at the end.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -30,17 +30,17 @@ pub const SCANS: [(&str, Scan); 4] = [
     ("hilbert", Scan::Hilbert),
 ];
 
-/// A solid that is made.
+/// Parameters of a synthesised solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub method: Method,
     pub scan: Scan,
-    /// Voxels a side.
+    /// Voxels per side.
     pub size: usize,
     pub levels: usize,
     pub neighbourhood: usize,
     pub iterations: usize,
-    /// Similar pixels; by method if `None`.
+    /// Number k of similar pixels; `None` takes the method's own.
     pub similar: Option<usize>,
     pub seed: u64,
 }
@@ -68,7 +68,7 @@ impl Case {
             .with_neighbourhood(self.neighbourhood)
             .with_iterations(self.iterations)
             .with_seed(self.seed);
-        // Ours chooses its own levels.
+        // Our method chooses its levels itself.
         let options = if self.method == Method::Best {
             options
         } else {
@@ -81,7 +81,7 @@ impl Case {
     }
 }
 
-/// The solid beside its picture after one iteration of the finest level.
+/// The solid compared with its exemplar after one iteration of the finest level.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     pub kl_grey: f64,
@@ -90,7 +90,7 @@ pub struct Moment {
     pub kl_orientation: f64,
 }
 
-/// What came of a case.
+/// Result of a case.
 pub struct Outcome {
     pub case: Case,
     pub moments: Vec<Moment>,
@@ -99,7 +99,7 @@ pub struct Outcome {
     pub slice: Array2<f32>,
 }
 
-/// What a picture shows, as far as iterations are judged by it.
+/// Statistics of the exemplar by which iterations are evaluated.
 struct Shown {
     grey: Vec<f64>,
     deviation: f64,
@@ -128,7 +128,7 @@ fn shown(pictures: &[Array2<f32>]) -> Shown {
     }
 }
 
-/// Every fourth slice of the two families that look like the picture.
+/// Every fourth slice of the two families that resemble the exemplar.
 fn slices(values: &Array4<f32>) -> Vec<ArrayView3<'_, f32>> {
     [Family::Xz, Family::Yz]
         .iter()
@@ -140,7 +140,7 @@ fn go(_: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Makes and judges every case, as many at once as there are cores: the sequential solver takes one each.
+/// Synthesises and evaluates every case, one per core at a time, as the sequential solver uses one core.
 pub fn run(picture: &Array2<f32>, cases: &[Case]) -> Result<Vec<Outcome>> {
     let wanted = shown(std::slice::from_ref(picture));
     let column = picture.view().insert_axis(Axis(2));
@@ -182,7 +182,8 @@ pub fn run(picture: &Array2<f32>, cases: &[Case]) -> Result<Vec<Outcome>> {
         .collect()
 }
 
-/// The picture filtered to its fringes (the paper's figure 5b, d), about .5 and 6 deviations from black to white.
+/// The image filtered to its fringes (the paper's figure 5b, d), with mean 0.5 and 6 standard deviations from black to
+/// white.
 pub fn band_passed(picture: &Array2<f32>) -> Result<Array2<f32>> {
     let picture = picture.mapv(f64::from);
     let filtered = BandPass::of(&picture)?.filter(&picture)?;
@@ -190,17 +191,18 @@ pub fn band_passed(picture: &Array2<f32>) -> Result<Array2<f32>> {
     Ok(filtered.mapv(|v| (0.5 + v / (6.0 * deviation)).clamp(0.0, 1.0) as f32))
 }
 
-/// CPU seconds that this process has used; NaN where the system does not tell.
+/// CPU seconds that this process has used; NaN if the system does not report them.
 pub fn cpu_seconds() -> f64 {
     let ticks = std::fs::read_to_string("/proc/self/stat").ok().and_then(|stat| {
-        // After the name in brackets; fields 14 and 15 of all, in hundredths of a second.
+        // After the name in brackets: fields 14 and 15 of the line, in hundredths of a second.
         let fields: Vec<String> = stat.rsplit(')').next()?.split_whitespace().map(String::from).collect();
         Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
     });
     ticks.map_or(f64::NAN, |ticks| ticks / 100.0)
 }
 
-/// CPU microseconds a voxel and iteration of a method and scan, learning left out: the difference of three iterations and one.
+/// CPU microseconds per voxel and iteration of a method and scan without learning: from the difference of three
+/// iterations and one.
 pub fn cost(picture: &Array2<f32>, method: Method, scan: Scan) -> Result<f64> {
     let exemplar = [Exemplar::grey(picture.view())?];
     let domain = Domain::new([64; 3])?;
@@ -217,7 +219,7 @@ pub fn cost(picture: &Array2<f32>, method: Method, scan: Scan) -> Result<f64> {
     Ok(1e6 * (long - short) / (many - few) as f64)
 }
 
-/// CPU seconds to learn the `k` pixels like each pixel of a picture at its own resolution.
+/// CPU seconds to learn the `k` pixels most similar to each pixel of an image at its own resolution.
 pub fn learning(picture: &Array2<f32>, k: usize) -> Result<f64> {
     let exemplar = [Exemplar::grey(picture.view())?];
     let options = SolidOptions::default()
@@ -226,24 +228,24 @@ pub fn learning(picture: &Array2<f32>, k: usize) -> Result<f64> {
         .with_levels(1)
         .with_similar(k);
     let (domain, begin) = (Domain::new([2; 3])?, cpu_seconds());
-    // Progress is told for the first time when all is learnt.
+    // Progress is first reported when learning is complete.
     let stopped = synthesize_solid(&exemplar, &domain, &options, &|_| ControlFlow::Break(()));
     ensure!(stopped.is_err(), "learning was to be stopped");
     Ok(cpu_seconds() - begin)
 }
 
-/// Mean of a figure over outcomes; NaN where one of them has none.
+/// Mean of a value over outcomes; NaN if one of them has none.
 pub fn mean(outcomes: &[&Outcome], figure: impl Fn(&Comparison) -> Option<f64>) -> f64 {
     let sum: f64 = outcomes.iter().map(|o| figure(&o.found).unwrap_or(f64::NAN)).sum();
     sum / outcomes.len() as f64
 }
 
-/// A figure over its ideal.
+/// A value divided by its ideal.
 pub fn ratio(figure: Figure) -> Option<f64> {
     Some(figure.value? / figure.ideal?)
 }
 
-/// A table of all methods and scans on a picture, means over `seeds`, as text: solids of `size`³ voxels; the best method last.
+/// A table of all methods and scans on an image, means over `seeds`: solids of `size`³ voxels; the best method last.
 pub fn table(name: &str, picture: &Array2<f32>, size: usize, seeds: u64, costs: bool) -> Result<String> {
     let mut cases = Vec::new();
     for (_, method) in METHODS {

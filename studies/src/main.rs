@@ -61,7 +61,8 @@ enum Task {
     },
     /// Times our tasks beside other programs and writes docs/bench-report.md
     BenchReport {
-        /// Python with the other programs (trimesh with scipy, shapely, networkx, rtree; spheropack; pyrtools); without it only our times are reported
+        /// Python with the other programs (trimesh with scipy, shapely, networkx, rtree; spheropack; pyrtools); without
+        /// it only our times are reported
         #[arg(long)]
         python: Option<PathBuf>,
         /// Measure only the section of this title; the others keep their old text

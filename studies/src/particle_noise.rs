@@ -1,4 +1,4 @@
-//! The noise of particles, from all of them pooled and from each alone: what it does to their borders.
+//! Noise of particles, estimated from all of them or from each alone: the effect on their borders.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -18,7 +18,8 @@ const MARKS: [&str; 2] = [
     "<!-- end of noise -->\n",
 ];
 
-/// Compares on the built-in sample and on photographs in `data`, and writes the table into `page` between its marks.
+/// Compares both on the built-in sample and on the photographs in `data`, and writes the table between the marks of
+/// `page`.
 pub fn run(data: &Path, page: &Path) -> Result<()> {
     let mut text = String::from(
         "| photograph | picture | step over the border | step inside particles | ratio | noise inside |\n|---|---|---|---|---|---|\n",
@@ -67,7 +68,7 @@ fn synthesised(residual: &Array3<f32>, mask: &Array2<bool>, size: [usize; 2]) ->
     synthesize_image(&exemplar, size, &TextureOptions::default(), &go)
 }
 
-/// Noise of binder and particles from the pixels of each that lie two pixels from any border.
+/// Noise of binder and particles from their pixels at least two pixels away from any border.
 fn pooled(found: &Segmentation, residual: &Array3<f32>) -> Result<Array3<f32>> {
     let labels = &found.labels;
     let (height, width) = labels.dim();
@@ -86,7 +87,7 @@ fn pooled(found: &Segmentation, residual: &Array3<f32>) -> Result<Array3<f32>> {
     }))
 }
 
-/// Noise of each particle from its own pixels, as far as these are enough; else the pooled one.
+/// Noise of each particle from its own pixels if there are enough of them, else the pooled noise.
 fn alone(found: &Segmentation, residual: &Array3<f32>, pooled: &Array3<f32>) -> Result<Array3<f32>> {
     let mut noise = pooled.clone();
     let most = found.labels.iter().copied().max().unwrap_or(0) as usize;
@@ -121,8 +122,8 @@ fn depth_at_least(labels: &Array2<u32>, y: usize, x: usize, reach: usize) -> boo
         .all(|at| labels[at] == labels[[y, x]])
 }
 
-/// Mean absolute difference of luminance between neighbours across a border of particle and binder, and between neighbours
-/// inside particles; and the noise's standard deviation inside particles.
+/// Mean absolute difference of luminance between neighbours across a border of particle and binder, and between
+/// neighbours inside particles; and the noise's standard deviation inside particles.
 fn measure(labels: &Array2<u32>, picture: &Array3<f32>, noise: &Array3<f32>) -> [f64; 3] {
     let grey = |of: &Array3<f32>, [y, x]: [usize; 2]| {
         f64::from(0.299 * of[[y, x, 0]] + 0.587 * of[[y, x, 1]] + 0.114 * of[[y, x, 2]])

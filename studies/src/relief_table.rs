@@ -1,4 +1,4 @@
-//! The released program's reliefs on real meshes, and its gallery in a real browser: tables for docs/microgeometry.md.
+//! The released program's reliefs on scanned meshes, and its gallery in a browser: tables for docs/microgeometry.md.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -32,7 +32,7 @@ const MESHES: [(&str, &str); 6] = [
 /// Candidates of the gallery.
 const CANDIDATES: &str = "500";
 
-/// Runs all and writes the tables into `page`.
+/// Runs all cases and writes the tables into `page`.
 pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<()> {
     ensure!(
         program.is_file(),
@@ -130,7 +130,7 @@ pub fn run(program: &Path, data: &Path, results: &Path, page: &Path) -> Result<(
     Ok(())
 }
 
-/// Opens the gallery in Debian's chromium; the picture is there to be looked at.
+/// Opens the gallery in chromium and keeps a screenshot for inspection.
 fn screenshot(page: &Path, picture: &Path) -> Result<()> {
     let page = fs::canonicalize(page)?;
     let status = Command::new("chromium")
@@ -169,7 +169,7 @@ fn answer(program: &Path, words: &[PathBuf]) -> Result<Value> {
     Ok(serde_json::from_slice(&done.stdout)?)
 }
 
-/// Waves of about 30 pixels in all directions, cut at zero.
+/// A sum of waves of about 30 pixels in all directions, thresholded at zero.
 fn random_field() -> GrayImage {
     let mut random = ChaCha8Rng::seed_from_u64(10);
     let waves: Vec<[f64; 3]> = (0..100)

@@ -1,4 +1,5 @@
-//! One picture rendered by us and by Mitsuba (`pip install mitsuba`), an independent renderer, from the same mesh, camera and sky.
+//! One image rendered by this project and by Mitsuba (`pip install mitsuba`), an independent renderer, from the same
+//! mesh, camera and sky.
 
 use std::path::Path;
 use std::process::Command;
@@ -14,7 +15,8 @@ const SIDE: u32 = 256;
 const SKY: [u32; 2] = [1024, 512];
 const DISTANCE: f64 = 8.0;
 
-/// Mitsuba renders `mesh.ply` under `sky.f32` and leaves linear light in `mitsuba.f32`. Its columns of the sky run the other way round, from the back.
+/// Mitsuba renders `mesh.ply` under `sky.f32` and writes linear light to `mitsuba.f32`. Its columns of the sky run in
+/// the opposite direction, from the back.
 const SCRIPT: &str = r#"
 import sys, numpy as np, mitsuba as mi
 folder, azimuth, elevation, distance, fov, side, samples, red, green, blue = sys.argv[1], *map(float, sys.argv[2:])
@@ -38,7 +40,7 @@ scene = mi.load_dict({
 np.array(mi.render(scene)).astype("<f4").tofile(folder + "/mitsuba.f32")
 "#;
 
-/// Renders a torus both ways and says by how many grey levels the pictures differ; `folder` keeps both.
+/// Renders a torus both ways, prints the difference of the images in grey levels, and keeps both in `folder`.
 pub fn run(python: &Path, folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     let mesh = TriangleMesh::torus(2.0, 0.9, 96, 48);
@@ -88,13 +90,13 @@ pub fn run(python: &Path, folder: &Path) -> Result<()> {
     compare(&ours, &theirs, folder)
 }
 
-/// Differences over pixels that the object covers whole in both pictures.
+/// Differences over the pixels that the object covers completely in both images.
 fn compare(ours: &RgbImage, theirs: &Array3<f32>, folder: &Path) -> Result<()> {
     let picture = RgbImage::from_fn(SIDE, SIDE, |x, y| {
         image::Rgb([0, 1, 2].map(|c| encoded_byte(theirs[[y as usize, x as usize, c]])))
     });
     picture.save(folder.join("mitsuba.png"))?;
-    // Without the object Mitsuba shows the sky and we show black: the background is told by our own.
+    // Where there is no object, Mitsuba shows the sky and our renderer black, so our image determines the background.
     let covered = |x: u32, y: u32| {
         (x.saturating_sub(1)..=(x + 1).min(SIDE - 1))
             .all(|x| (y.saturating_sub(1)..=(y + 1).min(SIDE - 1)).all(|y| ours.get_pixel(x, y).0[0] > 0))

@@ -1,6 +1,7 @@
-//! The built-in sample: a photograph-like section of a packing whose every particle is known.
+//! The built-in sample: a synthetic photograph of a section through a packing whose particles are all known.
 //!
-//! Dark chips, red chips and larger ochre pebbles in a pale binder: two shapes, three colour categories, a textured binder, uneven light, blur, sensor noise.
+//! Dark chips, red chips and larger ochre pebbles in a pale binder: two shapes, three colour categories, a textured
+//! binder, uneven light, blur, sensor noise.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -20,7 +21,7 @@ use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 use stereology::spectrum::{RealFft, frequency};
 use stereology::volume::{Axis, SlicePlane, Solid};
 
-/// Width, height of the photograph and depth of the box, in pixels.
+/// Width and height of the image and depth of the box, in pixels.
 const SIDES: [f64; 3] = [912.0, 672.0, 224.0];
 const FRACTION: f64 = 0.32;
 const SEED: u64 = 2004;
@@ -58,10 +59,10 @@ const CATEGORIES: [Category; 3] = [
     },
 ];
 
-/// Sizes are cut off here, so that the truth has a largest particle.
+/// Sizes are truncated here, so that the true distribution has a largest particle.
 const SIZE_LIMITS: [f64; 2] = [9.0, 60.0];
 
-/// Makes `sample.png` and `sample.json` in `folder`.
+/// Writes `sample.png` and `sample.json` to `folder`.
 pub fn run(folder: &Path) -> Result<()> {
     let types = ParticleTypes::new(vec![
         ("rock:7".to_owned(), stereology::shape::Body::rock(7), 0.6),
@@ -118,7 +119,8 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Lognormal sizes by category until the box is full to the fraction, each of a shape drawn by its share; then all scaled by the last hair.
+/// Lognormal sizes by category until the volume fraction is reached, each of a shape drawn by its fraction; then all
+/// are scaled slightly to the exact volume fraction.
 fn grains(bodies: &[UnitBody], types: &ParticleTypes, period: &PeriodicBox) -> Result<Vec<Grain>> {
     let mut rng = stream(2);
     let mut grains = Vec::new();
@@ -148,10 +150,10 @@ fn grains(bodies: &[UnitBody], types: &ParticleTypes, period: &PeriodicBox) -> R
     Ok(grains)
 }
 
-/// Texture, uneven light, the lens's blur and the sensor's noise.
+/// Texture, uneven light, lens blur and sensor noise.
 pub fn photograph(section: &RgbImage, ids: &Array2<u32>) -> Result<RgbImage> {
     let shape = [section.height() as usize, section.width() as usize];
-    // Grain of the binder and of the stones, coarse and fine, each with its own strength by channel.
+    // Coarse and fine grain of the binder and of the stones, each with its own amplitude per channel.
     let fields = [(3, 1.1), (4, 5.0), (5, 1.6), (6, 7.0)].map(|(task, scale)| noise(shape, scale, task));
     let fields: Vec<Array2<f64>> = fields.into_iter().collect::<Result<_>>()?;
     let tint = [1.0, 0.95, 0.85];
@@ -179,7 +181,7 @@ pub fn photograph(section: &RgbImage, ids: &Array2<u32>) -> Result<RgbImage> {
     Ok(picture)
 }
 
-/// Gaussian noise of standard deviation 1, smooth over `scale` pixels, that repeats.
+/// Periodic Gaussian noise of standard deviation 1, smooth over `scale` pixels.
 fn noise([height, width]: [usize; 2], scale: f64, task: u64) -> Result<Array2<f64>> {
     let mut rng = stream(task);
     let white = Array2::from_shape_simple_fn((height, width), || normal(&mut rng));

@@ -1,4 +1,4 @@
-//! The real volume: a CT scan of sand with a label for every grain, cut, unfolded, and compared with what the volume holds.
+//! A CT scan of sand with a label for every grain: sliced, unfolded, and compared with the grains of the volume.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -19,13 +19,14 @@ use stereology::unfold::{
 };
 use tiff::decoder::{Decoder, DecodingResult};
 
-/// Slices are so many voxels apart.
+/// Distance of the slices in voxels.
 const APART: usize = 10;
-/// Profiles below these are left out, voxels: what is smaller than eight voxels is noise of the labels; and below seven across an error of the label's
-/// border by half a voxel changes the area by more than a quarter. Hardly any grain is as small as that.
+/// Detection limits in voxels. Profiles of less than eight voxels are noise of the labels; below seven voxels in
+/// diameter an error of the label's border by half a voxel changes the area by more than a quarter. Very few grains are
+/// that small.
 const LEAST_SIZES: [f64; 2] = [3.19, 7.0];
 
-/// A connected piece of a label on a slice.
+/// A connected component of a label on a slice.
 struct Piece {
     label: u16,
     /// Diameter of the circle with its area.
@@ -33,22 +34,22 @@ struct Piece {
     around: BoundingBox,
 }
 
-/// How the labelled grains themselves show on planes: what no body stands for.
+/// The section law of the labelled grains themselves, measured on planes rather than assumed from a body.
 #[derive(Default)]
 struct GrainLaw {
-    /// Sizes of profiles over that of the grain's largest, rising.
+    /// Sizes of profiles relative to the grain's largest, ascending.
     relative: Vec<f64>,
-    /// Mean number of profiles over the grain's size: H of a grain of size 1, pieces counted one by one.
+    /// Mean number of profiles over the grain's size: H of a grain of size 1, components counted separately.
     caliper: f64,
-    /// Mean volume over the cube of the size.
+    /// Mean volume divided by the cube of the size.
     unit_volume: f64,
-    /// Sizes of the grains, rising.
+    /// Sizes of the grains, ascending.
     sizes: Vec<f64>,
 }
 
 /// Labels, x fastest.
 struct Labels {
-    /// Of z, y, x.
+    /// Sizes along z, y, x.
     shape: [usize; 3],
     values: Vec<u16>,
 }
@@ -90,7 +91,7 @@ impl Labels {
         }
     }
 
-    /// The connected pieces of every label on a slice.
+    /// The connected components of every label on a slice.
     fn pieces(&self, axis: usize, depth: usize) -> Vec<Piece> {
         let [u, v] = match axis {
             0 => [1, 2],
@@ -164,7 +165,7 @@ impl Labels {
         }
     }
 
-    /// What the grains that do not touch the box show on all planes along the axes.
+    /// The section law of the grains that do not touch the box, on all planes along the axes.
     fn section_law(&self) -> GrainLaw {
         let labels = usize::from(self.values.iter().copied().max().unwrap_or(0)) + 1;
         let (mut sizes, mut volumes, mut cut) = (vec![Vec::new(); labels], vec![0.0; labels], vec![false; labels]);
@@ -200,7 +201,8 @@ impl Labels {
         law
     }
 
-    /// Middle and least semi-axis over the largest: medians of the inertia ellipsoids of the grains that do not touch the box.
+    /// Middle and least semi-axis relative to the largest: medians over the inertia ellipsoids of the grains that do
+    /// not touch the box.
     fn axis_ratios(&self) -> [f64; 2] {
         let grains = usize::from(self.values.iter().copied().max().unwrap_or(0)) + 1;
         let mut sums = vec![(0.0, Vector3::zeros(), Matrix3::zeros(), false); grains];
@@ -237,8 +239,9 @@ impl Labels {
     }
 }
 
-/// Semi-axes 1, b^p, c^p of an ellipsoid whose mean width is that of the grains, both over the equal-volume diameter: the grains' is larger than that of their
-/// inertia ellipsoids, for they are neither smooth nor convex.
+/// Semi-axes 1, b^p, c^p of an ellipsoid whose mean width is that of the grains, both relative to the equal-volume
+/// diameter. The mean width of the grains is larger than that of their inertia ellipsoids, as they are neither smooth
+/// nor convex.
 fn with_width([b, c]: [f64; 2], width: f64) -> Result<[f64; 2]> {
     let [mut low, mut high] = [0.0, 6.0];
     for _ in 0..40 {
@@ -279,7 +282,7 @@ pub fn compare(data: &Path) -> Result<String> {
     let [wide_b, wide_c] = with_width([b, c], law.caliper / per_volume)?;
     let mut text = format!(
         "\nSand, a real CT volume: {} profiles on slices {APART} voxels apart along three axes, Miles-Lantuéjoul weights, against the labels of the volume (sizes as equal-volume \
-         diameters; 90 % intervals by drawing slices; ln evidence compares spheres and the grains' own law, on the same bins):\n\n| shape | profiles above, voxels | whole grains below that | density / true | mean size / true | \
+         diameters; 90 % intervals by resampling slices; the ln evidence compares shapes on the same bins):\n\n| shape | detection limit, voxels | whole grains below it | density / true | mean size / true | \
          volume fraction / true | ln evidence | method |\n|---|---|---|---|---|---|---|---|\n",
         profiles.weights.iter().filter(|weight| **weight > 0.0).count(),
     );
@@ -299,20 +302,20 @@ pub fn compare(data: &Path) -> Result<String> {
     let shapes = [
         ("sphere".to_owned(), "sphere".to_owned()),
         (
-            format!("ellipsoid:1,{b:.3},{c:.3}, the median one of inertia"),
+            format!("ellipsoid:1,{b:.3},{c:.3}, median inertia ellipsoid"),
             format!("ellipsoid:1,{b},{c}"),
         ),
         (
-            format!("ellipsoid:1,{wide_b:.3},{wide_c:.3}, of the grains' mean width"),
+            format!("ellipsoid:1,{wide_b:.3},{wide_c:.3}, with the grains' mean width"),
             format!("ellipsoid:1,{wide_b},{wide_c}"),
         ),
     ];
     for least in LEAST_SIZES {
-        // A profile of exactly that size was kept: the threshold lies just below it.
+        // A profile of exactly that size is kept: the detection limit is just below it.
         profiles.min_size = least;
         let unfolding = UnfoldOptions::default().with_bootstrap(bootstrap);
         let mut row = |name: &str, found: &Unfolding, unit_volume: f64| {
-            // The size of a body is that of its largest section; equal volume is another diameter.
+            // The size of a particle is that of its largest section; the true sizes are equal-volume diameters.
             let ratio = (6.0 * unit_volume / PI).cbrt();
             writeln!(
                 text,
@@ -339,7 +342,7 @@ pub fn compare(data: &Path) -> Result<String> {
             row(name, &found, types.unit_bodies()[0].volume())?;
         }
         row(
-            "the grains' own law of sections",
+            "the grains' own section law",
             &by_law(&profiles, &law, unfolding.with_min_size(threshold))?,
             law.unit_volume,
         )?;
@@ -347,7 +350,7 @@ pub fn compare(data: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Unfolds with the law of the labelled grains: what is left of the error if the shape is right.
+/// Unfolds with the section law of the labelled grains: the error that remains if the shape is known.
 fn by_law(profiles: &MeasuredProfiles, law: &GrainLaw, options: UnfoldOptions) -> Result<Unfolding> {
     let largest = profiles.sizes.iter().copied().fold(0.0, f64::max);
     let edges = equal_edges(largest, DensityOptions::default().bins);

@@ -1,4 +1,4 @@
-//! How well the slices of synthesised volumes match their exemplar: along the axes and obliquely, in every mode.
+//! Agreement of the slices of synthesised volumes with their exemplar: along the axes and obliquely, in every mode.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -39,8 +39,8 @@ const MARKS: [&str; 2] = [
     "<!-- end of what was measured -->\n",
 ];
 
-/// Synthesises every texture in `data` in every mode, writes the table into `page` between its marks, and cubes beside their
-/// exemplars into `results`.
+/// Synthesises every texture in `data` in every mode, writes the table between the marks of `page`, and images of the
+/// cubes beside their exemplars into `results`.
 pub fn run(data: &Path, results: &Path, page: &Path) -> Result<()> {
     fs::create_dir_all(results)?;
     let mut text = String::from(
@@ -79,7 +79,7 @@ pub fn run(data: &Path, results: &Path, page: &Path) -> Result<()> {
     replace_between(page, MARKS, &text)
 }
 
-/// Puts `text` between two marks of a page.
+/// Replaces the text between two marks of a page.
 pub fn replace_between(page: &Path, marks: [&str; 2], text: &str) -> Result<()> {
     let old = fs::read_to_string(page).with_context(|| page.display().to_string())?;
     let parts = old
@@ -92,7 +92,7 @@ pub fn replace_between(page: &Path, marks: [&str; 2], text: &str) -> Result<()> 
 
 /// Statistics of the exemplar's luminance.
 struct Wanted {
-    /// Mean squares: high-pass, levels (orientations added up).
+    /// Mean squares: high-pass, then levels (sum over orientations).
     variances: Vec<f64>,
     /// Sorted coefficients of each level, orientations together.
     levels: Vec<Vec<f32>>,
@@ -148,7 +148,7 @@ impl Wanted {
                     let bands = (0..ORIENTATIONS)
                         .map(|b| cut_band(grey.view(), normal, level, b, ORIENTATIONS))
                         .collect::<Result<Vec<_>, _>>()?;
-                    // Every fifth coefficient will do.
+                    // Every fifth coefficient suffices.
                     let found = sorted(bands.iter().flat_map(|band| band.iter().step_by(5).copied()));
                     distance.push(relative_distance(&found, wanted));
                     kurtosis.push((fourth(&found) - fourth(wanted)).powi(2));
@@ -216,7 +216,7 @@ fn sorted(values: impl Iterator<Item = f32>) -> Vec<f32> {
     values
 }
 
-/// Wasserstein-1 distance over the standard deviation of `wanted`; both sorted.
+/// Wasserstein-1 distance divided by the standard deviation of `wanted`; both are sorted.
 fn relative_distance(found: &[f32], wanted: &[f32]) -> f64 {
     let square = wanted.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() / wanted.len() as f64;
     wasserstein_sorted(found, wanted) / square.sqrt()
@@ -228,7 +228,7 @@ fn fourth(values: &[f32]) -> f64 {
     mean(4) / mean(2).powi(2)
 }
 
-/// Power within 18 degrees of an axis over the mean of its shell, frequencies 1/8 to 1/4.
+/// Power within 18 degrees of an axis relative to the mean of its shell, frequencies 1/8 to 1/4.
 fn cones(grey: &Array3<f32>) -> Result<f64> {
     let spectrum = RealFft::<f32>::new(&[SIDE; 3])?.forward(grey.view())?;
     let mut shells = vec![(0.0, 0.0, 0.0, 0.0); SIDE];
@@ -253,7 +253,7 @@ fn cones(grey: &Array3<f32>) -> Result<f64> {
     Ok(sum / inside.iter().map(|s| s.3).sum::<f64>())
 }
 
-/// Largest mean step between neighbouring planes over the median, all axes, the wrap included.
+/// Largest mean difference of neighbouring planes relative to the median, over all axes, including the periodic border.
 fn steps(volume: &Array4<f32>) -> f64 {
     (0..3)
         .map(|axis| {

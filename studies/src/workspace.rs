@@ -1,4 +1,4 @@
-//! Where the workspace stands.
+//! The folder of the workspace.
 
 use std::path::Path;
 

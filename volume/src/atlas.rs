@@ -6,7 +6,7 @@ use crate::charts::{Chart, Layout, MARGIN, Rectangle, charts, least_side};
 use crate::colour::{add, to_bytes};
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
-use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 use stereology_shape::{Texture, TexturedMesh, TriangleMesh, corner_normals};
 
 /// How an atlas is baked.
@@ -86,7 +86,7 @@ impl Solid {
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
         options: &BakeOptions,
-        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        progress: Progress<'_>,
     ) -> Result<Baked, CarveError> {
         check(mesh)?;
         let BakeOptions { pixels, samples } = *options;
@@ -172,7 +172,7 @@ struct Oven<'a> {
 }
 
 impl Oven<'_> {
-    fn texture(&self, pixels: u32, progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync)) -> Result<Vec<u8>, CarveError> {
+    fn texture(&self, pixels: u32, progress: Progress<'_>) -> Result<Vec<u8>, CarveError> {
         let row_bytes = 4 * pixels as usize;
         let mut rgba = vec![0; row_bytes * pixels as usize];
         let mut sum = [0_u64; 4];

@@ -5,7 +5,7 @@ use crate::atlas::MOST_PIXELS;
 use nalgebra::{Point3, Vector3, center};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
+use stereology_metrics::Progress;
 use stereology_shape::{ColouredMesh, TriangleMesh, corner_normals};
 
 /// How finely a mesh is carved.
@@ -128,7 +128,7 @@ impl Solid {
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
         options: &CarveOptions,
-        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        progress: Progress<'_>,
     ) -> Result<Carved, CarveError> {
         check(mesh)?;
         let detail = options

@@ -80,5 +80,6 @@ pub use residual::{Lookup, Residual};
 pub use sections::Axis;
 pub use slice::SlicePlane;
 pub use solid::{Solid, SolidError};
+pub use stereology_metrics::Progress;
 pub use turned::turned;
 pub use voxels::{Channel, ChannelError, VoxelGrid};

@@ -12,11 +12,11 @@ use crate::strip::{Runs, Strip};
 use nalgebra::{Point3, Vector3};
 use ndarray::{Array3, ArrayViewMut3};
 use rayon::prelude::*;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::slice::ChunksExactMut;
 use std::str::FromStr;
 use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
+use stereology_metrics::Progress;
 
 /// Rows that are worked on together: enough to share what they meet, few enough to share among threads.
 const ROWS_AT_A_TIME: usize = 64;
@@ -257,7 +257,7 @@ impl Solid {
         format: Format,
         grid: &VoxelGrid,
         channel: Channel,
-        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        progress: Progress<'_>,
     ) -> Result<(), GridError> {
         self.write(path.as_ref(), format, grid, channel, false, progress)
     }
@@ -273,7 +273,7 @@ impl Solid {
         format: Format,
         grid: &VoxelGrid,
         channel: Channel,
-        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        progress: Progress<'_>,
     ) -> Result<(), GridError> {
         self.write(path.as_ref(), format, grid, channel, true, progress)
     }
@@ -285,7 +285,7 @@ impl Solid {
         grid: &VoxelGrid,
         channel: Channel,
         resume: bool,
-        progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+        progress: Progress<'_>,
     ) -> Result<(), GridError> {
         let file = VoxelFile {
             path,
@@ -310,7 +310,7 @@ struct VoxelFile<'a> {
     format: Format,
     grid: &'a VoxelGrid,
     resume: bool,
-    progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'a>,
 }
 
 impl VoxelFile<'_> {

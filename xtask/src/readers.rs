@@ -51,6 +51,11 @@ fn installed(environment: &Path) -> Result<PathBuf> {
         succeed(Command::new(&python).args(["-c", &import])).is_ok()
     };
     if !has_all() {
+        println!(
+            "readers: installing {} into {}",
+            PACKAGES.join(", "),
+            environment.display()
+        );
         succeed(Command::new("python3").args(["-m", "venv"]).arg(environment))?;
         succeed(
             Command::new(&python)

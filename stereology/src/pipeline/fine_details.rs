@@ -1,8 +1,7 @@
 //! The residual of the photograph, synthesised again in three dimensions: section 4.3.
 
 use ndarray::{Array2, Array4, Axis};
-use std::ops::ControlFlow;
-use stereology_metrics::Finding;
+use stereology_metrics::{Finding, Progress};
 use stereology_pyramid::{Exemplar, TextureError, TextureOptions, TextureReport, synthesize_volume_with_report};
 use stereology_segment::Segmentation;
 use stereology_volume::Residual;
@@ -57,7 +56,7 @@ pub fn fine_details(
     voxels: usize,
     pixel: f64,
     options: &TextureOptions,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<FineDetails, TextureError> {
     let inner = far_from(&borders(&segmentation.labels), BORDER);
     let labels = &segmentation.labels;

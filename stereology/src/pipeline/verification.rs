@@ -2,7 +2,7 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "pictures are at most 1024 pixels wide")]
 
-use stereology_metrics::wasserstein;
+use stereology_metrics::{Progress, wasserstein};
 
 use crate::pipeline::MeasuredProfiles;
 use image::RgbImage;
@@ -119,7 +119,7 @@ pub fn verify(
     profiles: &MeasuredProfiles,
     recipe: Recipe<'_>,
     pixel: f64,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Verification, VerificationError> {
     let go_on = |done: f64| match progress(done) {
         ControlFlow::Continue(()) => Ok(()),
@@ -304,7 +304,7 @@ fn drawn_sections(solid: &Solid, photo: &Segmentation, pixel: f64) -> Result<Vec
 fn measure(
     drawn: &DrawnSection,
     recipe: Recipe<'_>,
-    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+    progress: Progress<'_>,
 ) -> Result<Option<Segmentation>, VerificationError> {
     let found = match recipe {
         Recipe::Segmented(options) => segment(&drawn.picture, options, progress),

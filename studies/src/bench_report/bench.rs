@@ -7,11 +7,11 @@ use anyhow::{Context, Result, ensure};
 use rayon::ThreadPool;
 use serde_json::Value;
 
-/// Our tasks against one peer's.
+/// Our tasks beside those of one reference program.
 pub(super) struct Section {
-    /// What was done by whom, what is counted and what is not.
+    /// What each program does, and what is included in the times.
     pub(super) words: String,
-    /// Name and version of the peer, or why there is none.
+    /// Name and version of the reference program, or why there is none.
     pub(super) peer: Result<String, String>,
     pub(super) rows: Vec<Row>,
 }
@@ -21,19 +21,19 @@ pub(super) struct Row {
     pub(super) task: String,
     pub(super) ours: f64,
     pub(super) peer: Option<f64>,
-    /// Whether both came to the same answer.
+    /// How the results of both compare.
     pub(super) remark: String,
 }
 
-/// Where times are taken.
+/// The Python and the thread pool of the measurements.
 pub(super) struct Bench {
     python: Option<PathBuf>,
-    /// One thread, so that its processor time is all of it.
+    /// One thread, so that its CPU time is the time of the whole task.
     one_core: ThreadPool,
 }
 
 impl Bench {
-    /// Times on one core, with the peers of this Python if there is one.
+    /// Measures on one core, with the reference programs of this Python if there is one.
     pub(super) fn new(python: Option<&Path>) -> Result<Self> {
         Ok(Self {
             python: python.map(Path::to_owned),
@@ -41,8 +41,8 @@ impl Bench {
         })
     }
 
-    /// CPU seconds of one run: of three batches of so many runs the shortest, for the system counts in steps of milliseconds. And what the
-    /// last run answered.
+    /// CPU seconds of one run: the shortest of three batches of `batch` runs, as the system counts in steps of
+    /// milliseconds. Also returns the result of the last run.
     pub(super) fn time<T: Send>(&self, batch: u32, task: impl Fn() -> Result<T> + Sync) -> Result<(f64, T)> {
         self.one_core.install(|| {
             let mut best = f64::INFINITY;
@@ -58,7 +58,7 @@ impl Bench {
         })
     }
 
-    /// What a script of ours prints, a JSON object with `version`; or why the peer cannot be asked.
+    /// The JSON object that a script prints, with `version`; or why the reference program cannot be run.
     pub(super) fn ask_peer(&self, name: &str, script: &str, arguments: &[String]) -> Result<Result<Value, String>> {
         let Some(python) = &self.python else {
             return Ok(Err("not measured: no --python was given".to_owned()));
@@ -72,18 +72,19 @@ impl Bench {
             .with_context(|| format!("{} cannot be run", python.display()))?;
         ensure!(
             output.status.success(),
-            "the peer's script failed: {}",
+            "the script of the reference program failed: {}",
             String::from_utf8_lossy(&output.stderr)
         );
-        let answer: Value = serde_json::from_slice(&output.stdout).context("the peer's script printed no JSON")?;
+        let answer: Value =
+            serde_json::from_slice(&output.stdout).context("the script of the reference program printed no JSON")?;
         Ok(match answer.get("missing").and_then(Value::as_str) {
-            Some(missing) => Err(format!("not measured: {name} is not whole in that Python ({missing})")),
+            Some(missing) => Err(format!("not measured: that Python lacks {missing}, which {name} needs")),
             None => Ok(answer),
         })
     }
 }
 
-/// Processor time of this thread.
+/// CPU time of this thread.
 fn cpu_seconds() -> Result<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat")
         .context("processor times are read from /proc/thread-self/schedstat, which only Linux has")?;

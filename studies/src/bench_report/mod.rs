@@ -1,8 +1,8 @@
-//! `cargo xtask bench-report`: whole tasks of ours beside the programs people take for them today, timed in one run on one machine, as ratios.
+//! `cargo xtask bench-report`: our tasks beside the programs in use for them today, timed in one run on one machine.
 //!
-//! A section is a file beside this one: a function that times a few tasks, ours and the peer's, and a line in [`SECTIONS`]. The peer's side is a
-//! Python script of our own next to it, run by the interpreter that `--python` names; where the peer is not installed, the section says so and has
-//! our times alone.
+//! A section is a file in this folder: a function that times some tasks, ours and those of the reference program, and a
+//! line in [`SECTIONS`]. The reference program is run by a Python script in the same folder, with the interpreter that
+//! `--python` names. If the reference program is not installed, the section states that and has only our times.
 
 mod bench;
 mod packing;
@@ -19,7 +19,7 @@ use bench::{Bench, Section};
 /// Measures the tasks of a section.
 type Measure = fn(&Bench) -> Result<Section>;
 
-/// What is measured, in the order of the report.
+/// The sections in the order of the report.
 const SECTIONS: [(&str, Measure); 4] = [
     ("Section law", section_law::measure),
     ("Packing", packing::measure),
@@ -27,7 +27,8 @@ const SECTIONS: [(&str, Measure); 4] = [
     ("Solids", solids::measure),
 ];
 
-/// Times everything and writes the report; or the section of one title only, in place of the one that the report has.
+/// Measures all sections and writes the report; with `only`, measures the section of that title and keeps the text of
+/// the others.
 pub fn run(document: &Path, python: Option<&Path>, only: Option<&str>) -> Result<()> {
     let titles = SECTIONS.map(|(title, _)| title);
     ensure!(
@@ -41,8 +42,8 @@ pub fn run(document: &Path, python: Option<&Path>, only: Option<&str>) -> Result
         None => String::new(),
     };
     let mut text = format!(
-        "# Times beside other programs\n\nWritten by `cargo xtask bench-report --python PYTHON`. CPU seconds of one core, the \
-         fewest of several runs, each section in one run on {}; ratios carry over to other machines better than seconds.\n",
+        "# Times beside other programs\n\nWritten by `cargo xtask bench-report --python PYTHON`. CPU seconds on one core, the \
+         least of several runs, each section in one run on {}; ratios are more portable to other machines than seconds.\n",
         processor()
     );
     for (title, section) in SECTIONS {
@@ -57,7 +58,7 @@ pub fn run(document: &Path, python: Option<&Path>, only: Option<&str>) -> Result
     std::fs::write(document, text).with_context(|| format!("{} cannot be written", document.display()))
 }
 
-/// A section of a report, with the empty line before it.
+/// A section of a report, including the empty line before it.
 fn section_of<'a>(report: &'a str, title: &str) -> Option<&'a str> {
     let start = report.find(&format!("\n## {title}\n"))?;
     let rest = &report[start..];
@@ -65,23 +66,21 @@ fn section_of<'a>(report: &'a str, title: &str) -> Option<&'a str> {
     Some(&rest[..end])
 }
 
-/// The processor's name, where the system tells it.
+/// The name of the processor, if the system reports it.
 fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("model name"));
-    line.map_or("a machine without a name", |name| {
-        name.trim_start_matches([' ', '\t', ':'])
-    })
-    .to_owned()
+    line.map_or("an unnamed processor", |name| name.trim_start_matches([' ', '\t', ':']))
+        .to_owned()
 }
 
 fn markdown(title: &str, section: &Section) -> String {
     let (peer, who) = match &section.peer {
-        Ok(version) => (version.as_str(), "the peer"),
-        Err(missing) => (missing.as_str(), "peer"),
+        Ok(version) => (version.as_str(), "reference"),
+        Err(missing) => (missing.as_str(), "reference"),
     };
     let mut text = format!(
-        "\n## {}\n\n{}\n\nPeer: {peer}.\n\n| task | ours, s | {who}, s | ratio | |\n|---|---|---|---|---|\n",
+        "\n## {}\n\n{}\n\nReference: {peer}.\n\n| task | ours, s | {who}, s | ratio | |\n|---|---|---|---|---|\n",
         title, section.words
     );
     for row in &section.rows {
@@ -99,7 +98,7 @@ fn markdown(title: &str, section: &Section) -> String {
     text
 }
 
-/// Two digits that count.
+/// Two significant digits.
 fn significant(x: f64) -> String {
     if x <= 0.0 || !x.is_finite() {
         return "0".to_owned();
@@ -122,7 +121,7 @@ mod tests {
         );
     }
 
-    /// A section kept from an old report is all of it and nothing else.
+    /// A section kept from an old report is complete and contains nothing else.
     #[test]
     fn sections_are_found() {
         let report = "# T\n\nwords\n\n## A\n\na\n\n## B\n\nb\n";
@@ -131,9 +130,9 @@ mod tests {
         assert_eq!(section_of(report, "C"), None);
     }
 
-    /// Without the peer our times stand alone, and the report says why.
+    /// Without the reference program only our times are reported, with the reason.
     #[test]
-    fn a_missing_peer_is_said() {
+    fn a_missing_reference_program_is_reported() {
         let section = |peer, seconds| Section {
             words: "w".to_owned(),
             peer,
@@ -149,7 +148,7 @@ mod tests {
             &section(Err("not measured: no --python was given".to_owned()), None),
         );
         assert!(
-            alone.contains("Peer: not measured") && alone.contains("| cube | 0.50 | – | – |"),
+            alone.contains("Reference: not measured") && alone.contains("| cube | 0.50 | – | – |"),
             "{alone}"
         );
         let both = markdown("T", &section(Ok("trimesh 4".to_owned()), Some(5.0)));

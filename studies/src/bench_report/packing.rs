@@ -1,4 +1,5 @@
-//! Periodic packing: ours beside spheropack, which packs spheres only; then what nobody else packs periodically with proof.
+//! Periodic packing: ours beside spheropack, which packs spheres only; then packings that no other program makes with a
+//! certificate.
 
 use std::ops::ControlFlow;
 
@@ -25,7 +26,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         .iter()
         .map(|&(count, _)| lognormal_sizes(count, SIGMA, 1))
         .collect::<Result<Vec<_>, _>>()?;
-    // The peer's time near jamming grows without bound: it is asked up to .6.
+    // The reference program's time grows without bound near jamming, so it is measured up to a fraction of 0.6.
     let asked: Vec<usize> = (0..spheres.len()).filter(|&k| spheres[k].1 <= 0.6).collect();
     let path = std::env::temp_dir().join(format!("stereology-bench-sizes-{}.json", std::process::id()));
     let of_peer: Vec<&Vec<f64>> = asked.iter().map(|&k| &sizes[k]).collect();
@@ -46,18 +47,18 @@ pub fn measure(bench: &Bench) -> Result<Section> {
                 let number = |name: &str| {
                     row[name]
                         .as_f64()
-                        .with_context(|| format!("the peer's {name} is no number"))
+                        .with_context(|| format!("{name} of the reference program is not a number"))
                 };
                 (Some(number("seconds")?), format!("{:.4}", number("fraction")?))
             }
-            _ => (None, "not asked".to_owned()),
+            _ => (None, "not measured".to_owned()),
         };
         rows.push(Row {
             task: format!("{count} spheres at {fraction}"),
             ours,
             peer,
             remark: format!(
-                "{} iterations; fraction {:.4}, theirs {theirs}",
+                "{} iterations; fraction {:.4}, reference {theirs}",
                 packing.iterations(),
                 packing.fraction()
             ),
@@ -82,8 +83,8 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     }
     Ok(Section {
         words: format!(
-            "Sizes lognormal, σ {SIGMA}, the same on both sides; a periodic box; random starts to no overlap, ours with its certificate. Theirs: event-driven \
-             growth (Lubachevsky & Stillinger), spheres only."
+            "Sizes lognormal, σ {SIGMA}, equal for both programs; a periodic box; from random positions to no overlap, ours with its certificate. Reference: \
+             event-driven growth (Lubachevsky & Stillinger), spheres only."
         ),
         peer: answer
             .as_ref()
@@ -93,7 +94,7 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     })
 }
 
-/// The seconds of one packing, placing at random included, and the packing.
+/// CPU seconds of one packing, random placement included, and the packing.
 fn packed(bench: &Bench, bodies: &[UnitBody], sizes: &[f64], fraction: f64) -> Result<(f64, Packing)> {
     let batch = if sizes.len() > 1000 { 1 } else { 5 };
     bench.time(batch, || {

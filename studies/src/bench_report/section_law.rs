@@ -1,4 +1,5 @@
-//! The section law of a mesh: exact in depth by us, as random sections cut by trimesh, which is what people do today.
+//! The section law of a mesh: ours is exact in depth; the reference is trimesh with random sections, the usual way
+//! today.
 
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -10,7 +11,7 @@ use super::bench::{Bench, Row, Section};
 const SCRIPT: &str = include_str!("section_law.py");
 const BINS: usize = 10;
 const TOLERANCE: f64 = 0.005;
-/// Random planes that are really cut for the time of one.
+/// Random planes cut to measure the time of one.
 const PLANES: usize = 400;
 
 pub fn measure(bench: &Bench) -> Result<Section> {
@@ -44,14 +45,17 @@ pub fn measure(bench: &Bench) -> Result<Section> {
         let options = SectionOptions::default().with_bins(BINS).with_tolerance(TOLERANCE);
         let (ours, law) = bench.time(*runs, || Ok(SectionLaw::of_body(&body, &options)?))?;
         let peer = match &answer {
-            Ok(answer) => Some(peer_of(&answer["rows"][k]).with_context(|| format!("the peer's answer on {name}"))?),
+            Ok(answer) => Some(
+                peer_of(&answer["rows"][k])
+                    .with_context(|| format!("the result of the reference program for {name}"))?,
+            ),
             Err(_) => None,
         };
         let task = |what: &str| format!("{name}, {} triangles: {what}", mesh.triangles.len());
         let sections = sections_needed(&law);
         let agreement = peer.as_ref().map_or_else(String::new, |peer| {
             format!(
-                "profiles a hit {:.2} and {:.2}, mean section {:.3} and {:.3} (theirs of {} hits)",
+                "profiles per intersecting plane {:.2} and {:.2}, mean section {:.3} and {:.3} (reference: {} planes)",
                 law.profiles_per_hit(),
                 peer.profiles_per_hit,
                 law.mean_section_area(),
@@ -69,15 +73,15 @@ pub fn measure(bench: &Bench) -> Result<Section> {
             task: task("check and largest section, then law"),
             ours: checking + ours,
             peer: peer.as_ref().map(|peer| peer.seconds_per_hit * sections),
-            remark: "theirs checks nothing and takes the largest section met".to_owned(),
+            remark: "the reference checks nothing and takes the largest section found".to_owned(),
         });
     }
     Ok(Section {
         words: format!(
-            "K of {BINS} bins to a standard error of {TOLERANCE}. Ours: exact in depth, directions until the error is reached. Theirs: `Trimesh.section` by \
-             isotropic uniform random planes, `to_2D`, `polygons_full`, areas; the time of one section that hits, the best of three times {PLANES} planes, \
-             times the number of sections that brings the largest standard error of a count p of n, √(p (1 − p) / n), down to the same. So their seconds \
-             are reckoned, not waited for, and chance alone is counted as their error."
+            "K of {BINS} bins to a standard error of {TOLERANCE}. Ours: exact in depth, over directions until the error is reached. Reference: \
+             `Trimesh.section` by isotropic uniform random planes, `to_2D`, `polygons_full`, areas. Its time is that of one intersecting section (the best \
+             of three runs of {PLANES} planes) times the number of sections that reduces the largest standard error of a count p of n, √(p (1 − p) / n), \
+             to the same value. So its times are extrapolated, not measured, and only the statistical error is counted."
         ),
         peer: answer
             .as_ref()
@@ -95,16 +99,17 @@ struct Peer {
 }
 
 fn peer_of(row: &Value) -> Result<Peer> {
-    let number = |name: &str| row[name].as_f64().with_context(|| format!("{name} is no number"));
+    let number = |name: &str| row[name].as_f64().with_context(|| format!("{name} is not a number"));
     Ok(Peer {
         seconds_per_hit: number("seconds_per_hit")?,
         profiles_per_hit: number("profiles_per_hit")?,
         mean_section_area: number("mean_section_area")?,
-        hits: row["hits"].as_u64().context("hits is no count")?,
+        hits: row["hits"].as_u64().context("hits is not a count")?,
     })
 }
 
-/// Random sections that bring every `K[i][j] = (j / n) p` to the tolerance, p being the share of profiles; each section has m profiles.
+/// Number of random sections that brings every `K[i][j] = (j / n) p` to the tolerance, where p is the fraction of
+/// profiles and each section has m profiles.
 fn sections_needed(law: &SectionLaw) -> f64 {
     let matrix = law.k_matrix(BINS);
     let mut needed = 0.0_f64;

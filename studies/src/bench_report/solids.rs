@@ -1,4 +1,4 @@
-//! Solids: points asked one by one, over numbers of particles, and voxels written beside what the disk takes for the same bytes.
+//! Solids: colours of single points by number of particles, and voxels written beside a raw write of the same bytes.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -31,10 +31,10 @@ pub fn measure(bench: &Bench) -> Result<Section> {
             .collect();
         let (ours, _) = bench.time(3, || Ok(solid.colours_at(&points)))?;
         rows.push(Row {
-            task: format!("a million colours at random points of {} rocks", along.pow(3)),
+            task: format!("colours at a million random points of {} rocks", along.pow(3)),
             ours,
             peer: None,
-            remark: format!("{:.1} million a second on one core", 1e-6 * POINTS as f64 / ours),
+            remark: format!("{:.1} million per second on one core", 1e-6 * POINTS as f64 / ours),
         });
     }
     let folder = crate::workspace::root()?.join("target/bench-report");
@@ -44,17 +44,17 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     rows.extend(written?);
     Ok(Section {
         words: format!(
-            "Rocks of two shapes, a fifth of them overlapping a little, in a box of {SIDE:.0} with a residual of as many voxels along it. Files: voxels of 10648 \
-             rocks; here seconds are those of the clock with all cores, until the file is on the disk, and the peer is the disk: the same number of bytes \
-             that are there already. One is measured after the other, {RUNS} times, and medians are told, since a disk that is shared is now fast, now slow. Half \
-             the disk's pace is asked; each row says of how fast a disk ours is the half. Beyond that it is not the disk but the cores that set the pace."
+            "Rocks of two shapes, a fifth of them slightly overlapping, in a box of side {SIDE:.0} with a residual of as many voxels per side. Files: voxels of \
+             10648 rocks. Their times are wall times with all cores until the file is synced to disk; the reference is a raw disk write of the same number of \
+             bytes. Both are measured in turn, {RUNS} times, and medians are reported, as the speed of a shared disk varies. The target is half the speed of \
+             the disk; each row gives the speed of the disk of which ours is half. For faster disks the cores limit the speed."
         ),
-        peer: Ok("this disk".to_owned()),
+        peer: Ok("raw disk write".to_owned()),
         rows,
     })
 }
 
-/// Rocks on a lattice, shaken.
+/// Rocks on a randomly displaced lattice.
 fn rocks(along: u32) -> Result<Solid> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let spacing = SIDE / f64::from(along);
@@ -91,10 +91,10 @@ fn rocks(along: u32) -> Result<Solid> {
     )?)
 }
 
-/// Voxels in formats of every kind: one file, pages, chunks with coarser levels, and ids.
+/// Voxels in each kind of format: one file, pages, chunks with coarser resolutions, and ids.
 fn files(folder: &Path) -> Result<Vec<Row>> {
     let solid = rocks(22)?;
-    // So many that no file system can make fewer of.
+    // Random bytes, which no file system can compress.
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let block: Vec<u8> = (0..1 << 20).map(|_| random.random()).collect();
     let mut rows = Vec::new();
@@ -127,7 +127,7 @@ fn files(folder: &Path) -> Result<Vec<Row>> {
             ours,
             peer: Some(disk),
             remark: format!(
-                "{megabytes:.0} MB: {:.0} a second, half of {:.0}; the disk {:.0}",
+                "{megabytes:.0} MB: {:.0} MB/s, half of {:.0}; raw write {:.0}",
                 megabytes / ours,
                 2.0 * megabytes / ours,
                 megabytes / disk
@@ -143,13 +143,13 @@ fn seconds(task: impl FnOnce() -> Result<()>) -> Result<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Of an odd number of runs.
+/// Median of an odd number of runs.
 fn median(mut runs: Vec<f64>) -> f64 {
     runs.sort_by(f64::total_cmp);
     runs[runs.len() / 2]
 }
 
-/// Bytes of a file, or of all files of a folder, when they are on the disk.
+/// Bytes of a file, or of all files of a folder, after they are synced to disk.
 fn synced(path: &Path) -> Result<u64> {
     if !path.is_dir() {
         let file = File::open(path)?;
@@ -172,7 +172,7 @@ fn remove(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// So many bytes, until they are on the disk.
+/// Writes this many bytes and syncs them to disk.
 fn write_plainly(path: &Path, block: &[u8], bytes: u64) -> Result<()> {
     let mut file = File::create(path)?;
     let mut left = bytes;

@@ -1,4 +1,4 @@
-//! Textures: the steerable pyramid beside pyrtools and beside its own transforms alone; then syntheses.
+//! Textures: the steerable pyramid beside pyrtools and beside the Fourier transforms that it needs; then syntheses.
 
 use std::ops::ControlFlow;
 
@@ -34,17 +34,17 @@ pub fn measure(bench: &Bench) -> Result<Section> {
                 let number = answer["rows"][i][name].as_f64();
                 number
                     .map(Some)
-                    .with_context(|| format!("the peer's {name} is no number"))
+                    .with_context(|| format!("{name} of the reference program is not a number"))
             }
             Err(_) => Ok(None),
         };
-        let theirs = number("error")?.map_or(String::new(), |error| format!(", theirs {error:.0e}"));
+        let theirs = number("error")?.map_or(String::new(), |error| format!(", reference {error:.0e}"));
         rows.push(Row {
             task: format!("{side} x {side}, f64: pyramid planned, built and reconstructed"),
             ours,
             peer: number("seconds")?,
             remark: format!(
-                "its {transforms} transforms alone, planned before: {floor:.3} s; largest error {error:.0e}{theirs}"
+                "only its {transforms} Fourier transforms, without planning: {floor:.3} s; largest error {error:.0e}{theirs}"
             ),
         });
     }
@@ -55,29 +55,29 @@ pub fn measure(bench: &Bench) -> Result<Section> {
     let go = |_: f64| ControlFlow::Continue(());
     let options = TextureOptions::default();
     let (ours, _) = bench.time(1, || Ok(synthesize_image(&exemplar, [512, 512], &options, &go)?))?;
-    rows.push(alone("512 x 512 in colour, 5 rounds", ours, "asked: 1.5"));
+    rows.push(alone("512 x 512 in colour, 5 iterations", ours, "target: 1.5"));
     for (name, options, asked) in [
-        ("`volume`", options.clone().with_mode(Mode::Volume), "asked: 5"),
+        ("`volume`", options.clone().with_mode(Mode::Volume), "target: 5"),
         ("`spectrum`", options.clone().with_mode(Mode::Spectrum), ""),
         ("`slices`, axes only", options.clone().with_cuts(Cut::Axes), ""),
-        ("`slices`", options.clone(), "asked: 12"),
+        ("`slices`", options.clone(), "target: 12"),
         (
             "`slices`, ranks",
             options.clone().with_matching(Matching::Exact),
-            "asked: 25",
+            "target: 25",
         ),
     ] {
         let (ours, _) = bench.time(1, || Ok(synthesize_volume(&exemplar, [128; 3], &options, &go)?))?;
         rows.push(alone(
-            &format!("128 x 128 x 128 in colour, 5 rounds: {name}"),
+            &format!("128 x 128 x 128 in colour, 5 iterations: {name}"),
             ours,
             asked,
         ));
     }
     Ok(Section {
         words: format!(
-            "Steerable pyramid of {LEVELS} levels and {ORIENTATIONS} orientations of noise, theirs `SteerablePyramidFreq` of order 3 with its \
-             `recon_pyr`. Then Heeger-Bergen syntheses from 128 x 128 pixels, which nobody else has in three dimensions."
+            "Steerable pyramid of {LEVELS} levels and {ORIENTATIONS} orientations of a noise image; reference: `SteerablePyramidFreq` of order 3 with its \
+             `recon_pyr`. Then Heeger-Bergen syntheses from 128 x 128 pixels, for which no other program in three dimensions is known."
         ),
         peer: answer
             .as_ref()
@@ -96,7 +96,7 @@ fn alone(task: &str, ours: f64, remark: &str) -> Row {
     }
 }
 
-/// Seconds of the transforms that a pyramid and its reconstruction need, and nothing else; and how many they are.
+/// CPU seconds of only the Fourier transforms that a pyramid and its reconstruction need, and their number.
 fn transforms_alone(bench: &Bench, side: usize) -> Result<(f64, usize)> {
     let mut plans = Vec::new();
     for level in 0..=LEVELS {

@@ -1,4 +1,4 @@
-//! Bar charts beside each other, as SVG, and their numbers as CSV.
+//! Panels of bar charts as SVG, and their numbers as CSV.
 
 use std::fs;
 use std::io::Write;
@@ -9,7 +9,7 @@ use plotters::prelude::*;
 
 /// One set of bars of a panel.
 pub struct Series<'a> {
-    /// What it is, for the legend.
+    /// Name for the legend.
     pub name: &'a str,
     /// Height of each bar.
     pub values: &'a [f64],
@@ -21,15 +21,15 @@ pub struct Series<'a> {
 
 /// One chart.
 pub struct Panel<'a> {
-    /// Its title.
+    /// Title.
     pub title: &'a str,
-    /// What the horizontal axis is.
+    /// Label of the horizontal axis.
     pub across: &'a str,
-    /// Its ends; bars are spread evenly between them.
+    /// Ends of the horizontal axis; bars are spaced evenly between them.
     pub span: [f64; 2],
-    /// What the vertical axis is.
+    /// Label of the vertical axis.
     pub up: &'a str,
-    /// Bars that stand beside each other.
+    /// The sets of bars, drawn next to each other.
     pub series: Vec<Series<'a>>,
 }
 
@@ -66,7 +66,7 @@ fn draw_panel(
                 .map(|(i, v)| of.errors.map_or(*v, |e| e[i].1.max(*v)))
         })
         .fold(1e-300, f64::max);
-    // The legend stands above the bars, a line a series.
+    // The legend is above the bars, one line per series.
     let headroom = if panel.series.len() > 1 {
         1.08 + 0.16 * panel.series.len() as f64
     } else {

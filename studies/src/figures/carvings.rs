@@ -1,19 +1,20 @@
-//! What the figures carve: vases, bowls, columns, knots; all closed, z up.
+//! Closed meshes that the figures carve from solids: vases, bowls, columns, knots; z points up.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 use stereology::shape::TriangleMesh;
 
-/// Corners of a turned body around its axis, and around a tube.
+/// Vertices around the axis of a body of revolution, and around a tube.
 const AROUND: u32 = 192;
 
-/// The body that an outline [radius, height] makes when turned about the z axis. The outline begins and ends on the axis and runs up the outer side.
+/// The body of revolution of an outline [radius, height] about the z axis. The outline begins and ends on the axis and
+/// runs up the outer side.
 fn turned_body(outline: &[[f64; 2]]) -> TriangleMesh {
     turned_with(outline, |_| 1.0)
 }
 
-/// [`turned_body`] whose radius is times `share` of the angle: flutes, corners.
+/// [`turned_body`] with its radius multiplied by `share` of the angle, for flutes and corners.
 fn turned_with(outline: &[[f64; 2]], share: impl Fn(f64) -> f64) -> TriangleMesh {
     let rings = &outline[1..outline.len() - 1];
     let ends = [outline[0], outline[outline.len() - 1]].map(|[_, z]| Point3::new(0.0, 0.0, z));
@@ -101,7 +102,8 @@ pub fn column(radius: f64, height: f64) -> TriangleMesh {
     turned_with(&outline, |angle| 1.0 - 0.045 * (10.0 * angle).sin().abs())
 }
 
-/// A trefoil knot of a tube, its axis along z; it reaches 3 `scale` + `tube` from the axis. Tubes wider than 0.6 `scale` run into one another.
+/// A trefoil knot of a tube, its axis along z; it reaches 3 `scale` + `tube` from the axis. Tubes wider than 0.6
+/// `scale` run into one another.
 pub fn knot(scale: f64, tube: f64) -> TriangleMesh {
     const ALONG: u32 = 480;
     const ACROSS: u32 = 64;

@@ -1,4 +1,5 @@
-//! Figure 10: a volume whose every particle is known, cut into slices on one side and carved on the other; and the same thing carved from what the slices tell.
+//! Figure 10: a volume whose particles are all known, sliced in one part and carved in the other; and the same object
+//! carved from the volume recovered from the slices.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -29,9 +30,9 @@ use super::solids::row;
 
 /// Side of the known volume.
 const SIDE: f64 = 480.0;
-/// It is sliced at these heights, farther apart than any particle is large; what lies above is carved.
+/// Heights of the slices, farther apart than the largest particle; the part above is carved.
 const SLICES: [f64; 6] = [10.0, 50.0, 90.0, 130.0, 170.0, 210.0];
-/// Edge of a picture in pixels.
+/// Side of an image in pixels.
 const PICTURE: u32 = 400;
 
 const SHAPE: &str = "rock:5";
@@ -44,7 +45,7 @@ const STONES: [[f32; 3]; 3] = [[0.30, 0.35, 0.42], [0.58, 0.33, 0.26], [0.34, 0.
 const GRAIN: [f32; 2] = [0.035, 0.045];
 const SEED: u64 = 10;
 
-/// The volume that is known.
+/// The known volume.
 fn known(types: &ParticleTypes) -> Result<Solid> {
     let bodies = types.unit_bodies();
     let period = PeriodicBox::new(Vector3::repeat(SIDE))?;
@@ -96,7 +97,7 @@ fn packed(types: &ParticleTypes, grains: &[Grain], period: &PeriodicBox) -> Resu
     )?)
 }
 
-/// Slices as a camera sees them.
+/// Slices as synthetic photographs.
 fn slices(solid: &Solid) -> Result<Vec<RgbImage>> {
     let side = SIDE as u32;
     SLICES
@@ -108,7 +109,7 @@ fn slices(solid: &Solid) -> Result<Vec<RgbImage>> {
         .collect()
 }
 
-/// What all slices show, slice by slice.
+/// The profiles of all slices, slice by slice.
 fn pooled(found: &[Segmentation]) -> MeasuredProfiles {
     let mut all = MeasuredProfiles::default();
     for (slice, segmentation) in found.iter().enumerate() {
@@ -116,7 +117,7 @@ fn pooled(found: &[Segmentation]) -> MeasuredProfiles {
         all.slices.extend(std::iter::repeat_n(slice, of.sizes.len()));
         all.sizes.extend(of.sizes);
         all.weights.extend(of.weights);
-        // Categories are numbered on each slice by itself: here all particles are of one population.
+        // Categories are numbered separately on each slice, so all particles are treated as one population here.
         all.categories.extend(std::iter::repeat_n(0, of.categories.len()));
         all.area += of.area;
         all.min_size = all.min_size.max(of.min_size);
@@ -124,7 +125,7 @@ fn pooled(found: &[Segmentation]) -> MeasuredProfiles {
     all
 }
 
-/// The solid that the slices tell of.
+/// The solid recovered from the slices.
 fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensities) -> Result<Solid> {
     let fraction = found.iter().map(|of| of.area_fraction).sum::<f64>() / found.len() as f64;
     let voxels = 128;
@@ -152,7 +153,7 @@ fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensi
     )?)
 }
 
-/// The knot, in the part of the known volume that was not sliced.
+/// The knot in the part of the known volume that is not sliced.
 fn carved(colour: &(dyn Fn(&Point3<f64>) -> [f32; 3] + Sync)) -> Result<RgbImage> {
     let sliced = SLICES[SLICES.len() - 1];
     let middle = Vector3::new(0.5 * SIDE, 0.5 * SIDE, 0.5 * (sliced + SIDE));
@@ -167,7 +168,7 @@ fn carved(colour: &(dyn Fn(&Point3<f64>) -> [f32; 3] + Sync)) -> Result<RgbImage
     Ok(render_mesh(&mesh, colour, &camera, &options)?)
 }
 
-/// Two by two of the slices, at half their size.
+/// Four slices in two rows, at half their size.
 fn sheet(slices: &[RgbImage]) -> RgbImage {
     let (half, gap) = ((PICTURE - 8) / 2, 8);
     let mut sheet = RgbImage::from_pixel(PICTURE, PICTURE, image::Rgb([255; 3]));
@@ -179,7 +180,8 @@ fn sheet(slices: &[RgbImage]) -> RgbImage {
     sheet
 }
 
-/// (a) slices, (b) the knot of the known volume, (c) of the recovered one, (d) in mean colours, (e) of the photograph synthesised in 3D; and a table of densities.
+/// (a) slices, (b) the knot of the known volume, (c) of the recovered one, (d) in mean colours, (e) of the photograph
+/// synthesised in 3D; and a table of densities.
 pub fn draw(folder: &Path) -> Result<()> {
     let types = ParticleTypes::parse(&[SHAPE])?;
     let known = known(&types)?;
@@ -235,7 +237,7 @@ fn write_densities(known: &Solid, densities: &ParticleDensities, path: &Path) ->
     )
 }
 
-/// The plain method of 1995 on a picture of the slice.
+/// The Heeger-Bergen method of 1995 on an image of the slice.
 fn heeger_bergen(slice: &RgbImage) -> Result<Array4<f32>> {
     let shape = (slice.height() as usize, slice.width() as usize, 3);
     let exemplar = Array3::from_shape_fn(shape, |(y, x, channel)| {

@@ -1,4 +1,4 @@
-//! Figures 7 and 8: known distributions of spheres, packed, cut by ten planes, and recovered from what the planes show.
+//! Figures 7 and 8: known distributions of spheres, packed, cut by ten planes, and recovered from the profiles.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -34,7 +34,7 @@ struct Experiment {
     actual: Vec<f64>,
     paper: Unfolding,
     auto: Unfolding,
-    /// Shares of the classes, times the total of `auto`: GrainSizeTools has none.
+    /// Fractions of the classes times the total of `auto`, as GrainSizeTools estimates no total.
     grain_size_tools: Vec<f64>,
 }
 
@@ -97,7 +97,7 @@ fn packed(types: &ParticleTypes, grains: &[Grain], seed: u64) -> Result<Packing>
     )?)
 }
 
-/// Every sphere in its own colour, in grey.
+/// Every sphere in a grey of its own.
 fn coloured(packing: &Packing) -> Result<Solid> {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let hues = [
@@ -124,7 +124,7 @@ fn values(unfolding: &Unfolding) -> Vec<f64> {
     unfolding.number_density.iter().map(|n| n.unwrap_or(0.0)).collect()
 }
 
-/// The ends of the intervals of each bin.
+/// Ends of each bin's interval.
 fn ends(unfolding: &Unfolding) -> Vec<(f64, f64)> {
     let intervals = unfolding.intervals.iter().flatten();
     intervals

@@ -1,4 +1,4 @@
-//! Tables of the estimators on figure 7's distributions: how far they are off, how often their intervals hold the truth, how long they take.
+//! Tables of the estimators on figure 7's distributions: errors, coverage of the intervals, and times.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -20,7 +20,7 @@ use super::sphere_samples::{AREA, BAND_ON_MODE, Diameters, FEW, FIGURE_7, Popula
 const BINS: usize = 10;
 const SEEDS: u64 = 200;
 
-/// An estimator with the bins it wants.
+/// An estimator and its bins.
 struct Estimator {
     name: &'static str,
     method: Method,
@@ -109,7 +109,8 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
         }
         let all: Vec<[f64; 3]> = (0..SEEDS)
             .map(|seed| {
-                // On common classes; by itself it ends them at the largest profile. It has no total.
+                // On common classes, although the program itself ends them at the largest profile. It estimates no
+                // total.
                 scores(&saltykov(&population.profiles(seed).sizes, 1.0, BINS), &truth)
             })
             .collect();
@@ -130,7 +131,7 @@ pub fn draw_errors(folder: &Path) -> Result<()> {
     Ok(fs::write(folder.join("estimators.csv"), text)?)
 }
 
-/// The least error there can be: every profile with the diameter of its sphere, weighed by 1 / D.
+/// The least possible error: every profile with the diameter of its sphere, weighted by 1 / D.
 fn by_cut_spheres(population: &Population, seed: u64) -> Vec<f64> {
     let mut found = vec![0.0; BINS];
     for diameter in population.profiles(seed).cut {
@@ -140,7 +141,7 @@ fn by_cut_spheres(population: &Population, seed: u64) -> Vec<f64> {
     found
 }
 
-/// Which intervals hold the truth.
+/// Which intervals contain the true value.
 #[derive(Clone, Copy, Default)]
 struct Held {
     total: f64,
@@ -156,7 +157,8 @@ fn holds(interval: Option<Interval>, truth: f64) -> f64 {
     ))
 }
 
-/// The table of coverage: how often nominal 90 % intervals of 200 replicates hold the truth, 200 samples each, other samples for each distribution.
+/// The table of coverage: how often nominal 90 % intervals of 200 replicates contain the true value, 200 samples per
+/// distribution.
 pub fn draw_coverage(folder: &Path) -> Result<()> {
     let auto = Estimator::new("auto", Method::Auto, Sizes::Integrated, None)?;
     let mut text = String::from("drawn,distribution,total,mean_size,volume_fraction,bins,worst_bin,width_of_total\n");
@@ -221,26 +223,28 @@ fn coverage(estimator: &Estimator, of: &Diameters, first_seed: u64, resampling: 
     Ok((held, width))
 }
 
-/// Samples a time is the mean of.
+/// Number of samples over which a time is averaged.
 const TIMED: u64 = 20;
-/// Processor time is counted in hundredths of a second: as many runs as fill so many seconds.
+/// Seconds to fill with runs, as CPU time is counted in hundredths of a second.
 const LONG_ENOUGH: f64 = 0.5;
 
-/// Processor seconds of this process by the account of Linux, which other work on the machine does not change much; by the clock elsewhere.
+/// CPU seconds of this process as Linux counts them, which other work on the machine changes little; wall time on other
+/// systems.
 fn processor_seconds(since: Instant) -> f64 {
     let ticks = fs::read_to_string("/proc/self/stat").ok().and_then(|stat| {
-        // After the name in brackets: state is the first field, time in the program the twelfth.
+        // After the name in brackets, the state is the first field and the user time the twelfth.
         stat.rsplit_once(')')?.1.split_whitespace().nth(11)?.parse::<f64>().ok()
     });
     ticks.map_or_else(|| since.elapsed().as_secs_f64(), |ticks| 0.01 * ticks)
 }
 
-/// The table of times on one thread: a default fit, one with 200 replicates, and a million profiles counted and fitted; milliseconds of processor time.
+/// The table of times on one thread: a default fit, one with 200 replicates, and a million profiles counted and fitted;
+/// milliseconds of CPU time.
 pub fn draw_speed(folder: &Path) -> Result<()> {
     let auto = Estimator::new("auto", Method::Auto, Sizes::Integrated, None)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let clock = Instant::now();
-    // The mean over samples in turn, until long enough.
+    // The samples in turn, until the time is long enough; then the mean.
     let mean = |samples: &[Profiles], bootstrap: Option<Bootstrap>| -> Result<f64> {
         let start = processor_seconds(clock);
         let mut runs = 0.0;

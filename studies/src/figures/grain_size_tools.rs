@@ -1,8 +1,10 @@
-//! The Saltykov estimate as the program GrainSizeTools makes it, for comparison: histogram with bins closed below, then from the
-//! largest class down the profiles of spheres at a class's middle are taken off the smaller classes, scaled by the chance of the largest class at its upper
-//! edge; negative classes are set to zero and the whole to 1.
+//! The Saltykov estimate as the program GrainSizeTools computes it, for comparison.
+//!
+//! The histogram has bins closed below. From the largest class down, the profiles of spheres of the class's middle size
+//! are subtracted from the smaller classes, scaled by the probability of the largest class at its upper edge. Negative
+//! classes are set to zero and the sum is normalised to 1.
 
-/// Shares of `bins` equal classes up to `largest`.
+/// Fractions of `bins` equal classes up to `largest`.
 pub fn saltykov(profiles: &[f64], largest: f64, bins: usize) -> Vec<f64> {
     let width = largest / bins as f64;
     let mut shares = vec![0.0; bins];

@@ -1,4 +1,4 @@
-//! Figures 2 to 6 of Stone et al. 2014 on a drawn soapstone, and how seams and likeness depend on the window.
+//! Figures 2 to 6 of Stone et al. 2014 on a synthetic soapstone, and how seams and similarity depend on the window.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -28,7 +28,7 @@ fn go(_: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Draws all figures of growing.
+/// Draws all figures of growth.
 pub fn draw(folder: &Path) -> Result<()> {
     let stone = soapstone();
     shown(&stone.view()).save(folder.join("grow-1-soapstone.png"))?;
@@ -71,14 +71,14 @@ fn soapstone() -> Array3<f32> {
                 let along = (u * cos + v * sin) / length;
                 let across = (v * cos - u * sin) / width;
                 if along * along + across * across < 1.0 {
-                    // The picture repeats, so no flake is cut by its border.
+                    // The image is periodic, so its border cuts no flake.
                     let place = |c: f64, d: i64| (c as i64 + d).rem_euclid(SIDE as i64) as usize;
                     grey[[place(cy, dy), place(cx, dx), 0]] = tone as f32;
                 }
             }
         }
     }
-    // The grain of a real picture: it gives the windows something to hold on to inside a flake.
+    // Grain as in a real image, so that windows inside a flake are not all alike.
     let sharp = grey.mapv(|v| v + 0.16 * (rng.random::<f32>() - 0.5));
     Array3::from_shape_fn((SIDE, SIDE, 1), |(y, x, _)| {
         let sum: f32 = [(0, 0), (0, 1), (1, 0), (1, 1)]
@@ -89,7 +89,7 @@ fn soapstone() -> Array3<f32> {
     })
 }
 
-/// Figure 2: pictures of 256² from pieces of 50² and 200², grown and by levels.
+/// Figure 2: images of 256² from exemplars of 50² and 200², grown and by resolution levels.
 fn pictures(folder: &Path, stone: &Array3<f32>) -> Result<()> {
     for side in [50, 200] {
         let piece = stone.slice_axis(Axis(0), (0..side).into());
@@ -180,7 +180,7 @@ fn body(folder: &Path, stone: &Array3<f32>) -> Result<()> {
     Ok(())
 }
 
-/// Seams, likeness and sharpness by window and planes, into docs/grow.md.
+/// Seams, similarity and sharpness by window and planes, for docs/grow.md.
 fn table(folder: &Path, stone: &Array3<f32>) -> Result<()> {
     let block = Array3::from_elem((48, 48, 48), true);
     let mut text = String::from(
@@ -245,7 +245,7 @@ fn table(folder: &Path, stone: &Array3<f32>) -> Result<()> {
     Ok(())
 }
 
-/// A colour of its own for each cell.
+/// A distinct colour for each cell.
 fn cell_colour(label: u32) -> [u8; 3] {
     let mut rng = ChaCha8Rng::seed_from_u64(u64::from(label));
     [0; 3].map(|_| rng.random_range(70..240))
@@ -268,7 +268,7 @@ fn larger(picture: &RgbImage, factor: u32) -> RgbImage {
     )
 }
 
-/// Pictures side by side, their tops at one height.
+/// Images side by side, aligned at the top.
 pub fn row(pictures: &[RgbImage]) -> RgbImage {
     let height = pictures.iter().map(RgbImage::height).max().unwrap_or(1);
     let width: u32 = pictures.iter().map(|p| p.width() + 8).sum();
@@ -281,7 +281,7 @@ pub fn row(pictures: &[RgbImage]) -> RgbImage {
     all
 }
 
-/// Pictures one above the other.
+/// Images one above the other.
 pub fn column(pictures: &[RgbImage]) -> RgbImage {
     let width = pictures.iter().map(RgbImage::width).max().unwrap_or(1);
     let height: u32 = pictures.iter().map(|p| p.height() + 8).sum();

@@ -1,4 +1,5 @@
-//! Figures 3 to 11 of Urs et al. 2012 on a drawn lattice fringe image: methods and scans by iteration, fringes, and what k, levels, neighbourhood and sizes do.
+//! Figures 3 to 11 of Urs et al. 2012 on a synthetic lattice fringe image: methods and scans by iteration, fringes, and
+//! the effect of k, levels, neighbourhood and sizes.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -18,20 +19,21 @@ use super::lines::{Chart, Line, draw as chart};
 use crate::laminar_study::{Case, HEAD, METHODS, Moment, Outcome, SCANS, band_passed, learning, ratio, run, table};
 use crate::texture_table::replace_between;
 
-/// The paper's size: picture and solid.
+/// The paper's size of image and solid.
 const SIDE: usize = 128;
-/// Solids of the tables and of what is varied.
+/// Size of the solids of the tables and of the parameter studies.
 const SMALL: usize = 64;
 
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GOLD: RGBColor = RGBColor(214, 158, 46);
 const VIOLET: RGBColor = RGBColor(120, 90, 160);
 
-/// A lattice fringe image of dense carbon: layers 7 pixels apart, undulating, of limited length (dislocations end them), of changing contrast, under a slow
-/// background and grain. Values 0 to 1.
+/// A lattice fringe image of dense carbon: layers 7 pixels apart, undulating, of limited length (dislocations end
+/// them), of changing contrast, under a slow background and grain. Values 0 to 1.
 ///
 /// ```text
-/// f = A cos(2π (y + u) / 7 + Σ ± atan2(y − y_k, x − x_k)) + B + grain        u, A, B: sums of waves of random direction, long along x
+/// f = A cos(2π (y + u) / 7 + Σ ± atan2(y − y_k, x − x_k)) + B + grain
+/// u, A, B: sums of waves of random direction, long along x
 /// ```
 pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -75,14 +77,14 @@ pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
     })
 }
 
-/// The picture that is studied, raw and band-passed.
+/// The studied image, raw and band-passed.
 fn inputs() -> Result<[Array2<f32>; 2]> {
     let raw = fringe_picture(SIDE, 2012);
     let filtered = band_passed(&raw)?;
     Ok([raw, filtered])
 }
 
-/// Slices, what happens from iteration to iteration, and fringes, at the paper's size.
+/// Slices, progress by iteration, and fringes, at the paper's size.
 pub fn draw(folder: &Path) -> Result<()> {
     let [raw, filtered] = inputs()?;
     let hilbert: Vec<Case> = METHODS
@@ -109,7 +111,7 @@ pub fn draw(folder: &Path) -> Result<()> {
     fringes(folder, &of_raw[..4])
 }
 
-/// All methods and scans, into docs/exemplar.md.
+/// All methods and scans, for docs/exemplar.md.
 pub fn draw_table(folder: &Path) -> Result<()> {
     let [raw, filtered] = inputs()?;
     let mut text = format!("\n{HEAD}");
@@ -151,7 +153,7 @@ fn scan_of(outcome: &Outcome) -> (&'static str, RGBColor) {
     }
 }
 
-/// Figures 7, 9 and 11: what happens from iteration to iteration.
+/// Figures 7, 9 and 11: progress by iteration.
 fn iterations(folder: &Path, raw: &[Outcome], filtered: &[Outcome]) -> Result<()> {
     type Of = (&'static str, fn(&Moment) -> f64, bool);
     let figures: [Of; 4] = [
@@ -221,7 +223,7 @@ fn iterations(folder: &Path, raw: &[Outcome], filtered: &[Outcome]) -> Result<()
     csv(&folder.join("laminar-iterations.csv"), &head, &lines)
 }
 
-/// Figures 7a, 8c and 10: distributions of greys, orientations, lengths and windings.
+/// Figures 7a, 8c and 10: distributions of grey values, orientations, lengths and tortuosities.
 fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
     type Points = Vec<(f64, f64)>;
     let curves = |of: &dyn Fn(&Outcome, usize) -> Points| {
@@ -306,7 +308,7 @@ fn fringes(folder: &Path, outcomes: &[Outcome]) -> Result<()> {
     )
 }
 
-/// What k, levels, neighbourhood and the sizes of picture and solid do.
+/// The effect of k, levels, neighbourhood and the sizes of image and solid.
 pub fn draw_parameters(folder: &Path) -> Result<()> {
     let [raw, _] = inputs()?;
     let raw = &raw;
@@ -335,7 +337,7 @@ pub fn draw_parameters(folder: &Path) -> Result<()> {
     let sides = [48, 64, 96, 128, 192, 256];
     let mut by_picture = Vec::new();
     for side in sides {
-        // As many as leave four neighbourhoods at the coarsest.
+        // As many levels as leave four neighbourhoods at the coarsest.
         let levels = if side < 64 {
             3
         } else if side < SIDE {

@@ -1,4 +1,4 @@
-//! Lines over numbers, charts beside each other, as SVG.
+//! Panels of line charts as SVG.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use plotters::prelude::*;
 
 /// One line of a chart.
 pub struct Line {
-    /// What it is, for the legend.
+    /// Name for the legend.
     pub name: String,
-    /// Its points.
+    /// Points.
     pub points: Vec<(f64, f64)>,
     /// Colour.
     pub colour: RGBColor,
@@ -17,13 +17,13 @@ pub struct Line {
 
 /// One chart.
 pub struct Chart {
-    /// Its title.
+    /// Title.
     pub title: String,
-    /// What the horizontal axis is.
+    /// Label of the horizontal axis.
     pub across: &'static str,
-    /// What the vertical axis is.
+    /// Label of the vertical axis.
     pub up: &'static str,
-    /// A value that would be ideal: a grey line.
+    /// The ideal value, drawn as a grey line.
     pub ideal: Option<f64>,
     /// Lines.
     pub lines: Vec<Line>,
@@ -43,7 +43,7 @@ pub fn draw(path: &Path, charts: &[Chart], columns: usize) -> Result<()> {
     root.present().map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// Least and greatest, with some room about them.
+/// Least and greatest value, with a margin.
 fn range(values: impl Iterator<Item = f64>, below: f64, above: f64) -> std::ops::Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let room = (high - low).max(1e-9);
@@ -56,7 +56,7 @@ fn draw_chart(
 ) -> Result<(), Box<dyn std::error::Error>> {
     let points = || chart.lines.iter().flat_map(|line| &line.points);
     let x = range(points().map(|p| p.0), 0.0, 0.0);
-    // The legend stands above the lines.
+    // The legend is above the lines.
     let headroom = 0.15 + 0.14 * chart.lines.len() as f64;
     let y = range(points().map(|p| p.1).chain(chart.ideal), 0.05, headroom);
     let mut drawn = ChartBuilder::on(area)

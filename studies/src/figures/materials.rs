@@ -1,4 +1,4 @@
-//! Figure 12: photographs of three materials, and what is carved from the solids made of them.
+//! Figure 12: synthetic photographs of three materials, and objects carved from the solids made from them.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,19 +21,19 @@ use super::carvings;
 use super::solids::{row, sample_types};
 use crate::sample::photograph;
 
-/// Edge of each picture in pixels.
+/// Side of each image in pixels.
 const SIDE: u32 = 420;
-/// Photographs are so wide and high; the packing behind them is this deep.
+/// Width and height of the synthetic photographs, and depth of the packing.
 const PHOTO: u32 = 640;
 const DEPTH: f64 = 160.0;
 
-/// A material whose solid is known, to be photographed.
+/// A material whose solid is known.
 struct Material {
     shape: &'static str,
     fraction: f64,
     median_size: f64,
     sigma: f64,
-    /// One is drawn for each particle.
+    /// The colours; one is drawn for each particle.
     colours: &'static [[f32; 3]],
     binder: [f32; 3],
     void: bool,
@@ -55,7 +55,7 @@ const ASPHALT: Material = Material {
     void: false,
 };
 
-/// Bubbles, dark on the photograph for they are deep.
+/// Bubbles, dark as they are deep.
 const FOAM: Material = Material {
     shape: "sphere",
     fraction: 0.40,
@@ -66,7 +66,7 @@ const FOAM: Material = Material {
     void: true,
 };
 
-/// A photograph, and the solid made of it.
+/// A synthetic photograph, and the solid made from it.
 pub struct Made {
     pub photo: RgbImage,
     pub solid: Solid,
@@ -94,7 +94,7 @@ fn made(photo: RgbImage, types: &ParticleTypes, void: bool) -> Result<Made> {
     Ok(Made { photo, solid })
 }
 
-/// Each row: the photograph, a block of the solid, a vase carved from it.
+/// Rows: the synthetic photograph, a block of the solid, a vase carved from it.
 pub fn draw(folder: &Path) -> Result<()> {
     for (name, made) in [("terrazzo", terrazzo()?), ("asphalt", asphalt()?), ("foam", foam()?)] {
         let part = crop_imm(&made.photo, 100, 100, SIDE, SIDE).to_image();
@@ -110,7 +110,7 @@ impl Material {
         made(self.photograph()?, &ParticleTypes::parse(&[self.shape])?, self.void)
     }
 
-    /// A section of a packing of such particles, as a camera sees it.
+    /// A synthetic photograph of a section through a packing of such particles.
     fn photograph(&self) -> Result<RgbImage> {
         let types = ParticleTypes::parse(&[self.shape])?;
         let bodies = types.unit_bodies();

@@ -1,4 +1,4 @@
-//! The papers' figures, drawn again from this workspace: pictures and tables under docs/figures.
+//! The papers' figures, reproduced by this workspace: images and tables under docs/figures.
 
 mod bars;
 mod carvings;

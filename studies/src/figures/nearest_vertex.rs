@@ -1,9 +1,9 @@
-//! Vertices of a mesh near to a point.
+//! Vertices of a mesh near a point.
 
 use nalgebra::Point3;
 use stereology::shape::TriangleMesh;
 
-/// The nearest vertex of a mesh, by cells.
+/// Search of the nearest vertex of a mesh, with a grid of cells.
 pub struct Nearest<'a> {
     points: &'a [Point3<f64>],
     low: Point3<f64>,
@@ -17,7 +17,7 @@ impl<'a> Nearest<'a> {
     pub fn new(mesh: &'a TriangleMesh) -> Self {
         let points = &mesh.vertices;
         let (low, high) = mesh.bounding_box().unwrap_or_default();
-        // A few points a cell of a surface.
+        // A few vertices per cell that the surface crosses.
         let cell = ((high - low).amax() / (points.len().max(1) as f64 / 6.0).sqrt()).max(1e-9);
         let sides = [0, 1, 2].map(|k| ((high[k] - low[k]) / cell) as usize + 1);
         let mut made = Self {
@@ -47,7 +47,7 @@ impl<'a> Nearest<'a> {
         (z * self.sides[1] + y) * self.sides[0] + x
     }
 
-    /// Mean of the values about a point, the near ones above all.
+    /// Mean of the values around a point, weighted towards near vertices.
     pub fn mean(&self, p: &Point3<f64>, values: &[f64]) -> f64 {
         let place = self.place(p);
         let range = |k: usize| place[k].saturating_sub(1)..=(place[k] + 1).min(self.sides[k] - 1);
@@ -68,7 +68,7 @@ impl<'a> Nearest<'a> {
         sum / of
     }
 
-    /// The nearest vertex, if one is within four cells.
+    /// The nearest vertex, if there is one within four cells.
     pub fn vertex(&self, p: &Point3<f64>) -> Option<usize> {
         let place = self.place(p);
         let mut best: Option<(f64, u32)> = None;

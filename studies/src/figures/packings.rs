@@ -1,4 +1,4 @@
-//! The ways of packing compared: a picture each, and their radial distributions.
+//! Comparison of the packing methods: an image of each, and their radial distributions.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -36,7 +36,7 @@ pub fn draw(folder: &Path) -> Result<()> {
         let options = PackOptions::default().with_mode(mode);
         let started = Instant::now();
         let packing = packed(&sphere, COUNT, FRACTION, &options)?;
-        // Times are told, not written: the same program draws the same files.
+        // Times are printed and not written, so that the same program writes the same files.
         println!("  {name}: {:.2} s", started.elapsed().as_secs_f64());
         picture(
             &packing,
@@ -154,10 +154,10 @@ fn by_shape(packing: &Packing) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Two spheres touch, for a picture, if less than this part of their mean size lies between them.
+/// Two spheres count as touching in an image if their gap is below this fraction of their mean size.
 const TOUCHING: f64 = 0.03;
 
-/// Colours of spheres by how many others touch them: none blue, one pale, two, three, four or more red.
+/// Colours of spheres by number of contacts: none is blue, one pale, two, three, four or more red.
 fn by_contacts(packing: &Packing) -> Vec<[f32; 3]> {
     const COLOURS: [[f32; 3]; 5] = [
         [0.23, 0.42, 0.70],
@@ -169,7 +169,7 @@ fn by_contacts(packing: &Packing) -> Vec<[f32; 3]> {
     touching(packing).into_iter().map(|n| COLOURS[n.min(4)]).collect()
 }
 
-/// How many spheres touch each one.
+/// Number of contacts of each sphere.
 fn touching(packing: &Packing) -> Vec<usize> {
     let particles = packing.particles();
     let touch = |i: usize, j: usize| {

@@ -1,5 +1,5 @@
-//! Figures 2, 3 and 9: the sphere's K matrix, slices of a particle in several pieces, a collection of particles; and the residual of the
-//! paper's random sections (section 3.2).
+//! Figures 2, 3 and 9: the sphere's K matrix, slices of a particle in several pieces, a collection of particles; and
+//! the residual of the paper's random sections (section 3.2).
 
 use std::path::Path;
 
@@ -80,7 +80,8 @@ pub fn draw_matrix(folder: &Path) -> Result<()> {
     )
 }
 
-/// Figure 3: slices through a star at three depths; away from its middle a slice falls into disjoint profiles, each counted by itself.
+/// Figure 3: slices through a star at three depths. Away from its middle a slice consists of disjoint profiles, each
+/// counted separately.
 pub fn draw_slices(folder: &Path) -> Result<()> {
     let star = Body::superellipsoid([1.0; 3], [2.6, 2.6])?;
     let mesh = star.mesh().ok_or_else(|| anyhow!("a superellipsoid is a mesh"))?;
@@ -146,8 +147,8 @@ fn draw_slice(
     Ok(())
 }
 
-/// How the residual of the paper's histogram falls with the number of random sections: largest of ten bins, for sections cut as polygons and
-/// drawn as pixels.
+/// The residual of the paper's histogram by number of random sections: largest of ten bins, for sections cut as
+/// polygons and drawn as pixels.
 pub fn draw_residuals(folder: &Path) -> Result<()> {
     const BINS: usize = 10;
     let torus = Body::from_mesh(ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 48, 24))?);
@@ -226,7 +227,7 @@ pub fn draw_residuals(folder: &Path) -> Result<()> {
     )
 }
 
-/// Figure 9: a collection of particle shapes, all as `stereology shape` writes them.
+/// Figure 9: a collection of particle shapes, all as the program's command `shape` writes them.
 pub fn draw_shapes(folder: &Path) -> Result<()> {
     const SIDE: u32 = 240;
     let mut pebble = ControlSphere::sphere(1.0);

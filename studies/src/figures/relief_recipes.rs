@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use stereology::microgeometry::{ContactDistribution, EstimateOptions, Law, contact_of_image, refined};
 use stereology::shape::{Body, Subdivision, TriangleMesh};
 
-/// A relief's recipe.
+/// Parameters of a relief.
 pub struct Recipe {
     pub contact: ContactDistribution,
     pub units: f64,
@@ -23,7 +23,7 @@ fn laws(negative: Law, positive: Law, share: f64) -> Result<ContactDistribution>
     Ok(ContactDistribution::from_laws(1.0, negative, positive, share)?)
 }
 
-/// Light and dark of a random field: the plainest of textures.
+/// Light and dark of a random field, the simplest texture.
 fn field() -> Result<ContactDistribution> {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let waves: Vec<[f64; 3]> = (0..80)
@@ -49,7 +49,7 @@ pub fn fine(mesh: TriangleMesh, edge: f64) -> Result<TriangleMesh> {
     Ok(refined(&mesh, Subdivision::Midpoint, edge)?)
 }
 
-/// A box with rounded edges: split first, so that Loop's scheme rounds the edges alone.
+/// A box with rounded edges. It is split first, so that Loop's scheme rounds only the edges.
 pub fn bar() -> Result<TriangleMesh> {
     let boxy = fine(TriangleMesh::cuboid([2.0, 0.72, 0.84]), 0.22)?;
     Ok(refined(&boxy, Subdivision::Loop, 0.028)?)
@@ -70,7 +70,7 @@ pub fn ring() -> TriangleMesh {
     TriangleMesh::torus(1.4, 0.6, 200, 90)
 }
 
-/// From 0 to 1 between two places, without corners.
+/// A smooth step from 0 to 1 between two positions.
 fn smooth(from: f64, to: f64, at: f64) -> f64 {
     let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -90,7 +90,7 @@ pub fn blade() -> Result<TriangleMesh> {
     fine(shaped, 0.026)
 }
 
-/// A head of a kind: a long ellipsoid on a neck.
+/// A simple head: a long ellipsoid on a neck.
 pub fn bust() -> Result<TriangleMesh> {
     let shaped = TriangleMesh::icosphere(2.0, 5).mapped(|p| {
         let t = (PI * (p.y + 1.0) / 2.0).clamp(0.0, PI);

@@ -73,7 +73,7 @@ fn relief(mesh: &TriangleMesh, of: &Recipe, seed: u64, side: u32) -> Result<RgbI
     let [negative, positive] = of.colours;
     let colour = |p: &Point3<f64>| {
         let value = near.mean(p, &made.values);
-        // The regions' colours run into each other over a distance of two bins.
+        // The colours of the regions blend over a distance of two bins.
         let share = (0.5 + 0.5 * value).clamp(0.0, 1.0) as f32;
         [0, 1, 2].map(|c| negative[c] + share * (positive[c] - negative[c]))
     };
@@ -154,7 +154,7 @@ fn spreading() -> Result<RgbImage> {
     Ok(row(&parts))
 }
 
-/// Figure 6: two regions, and how far their points lie from each other over the surface.
+/// Figure 6: two regions, and the distances of their points along the surface.
 fn regions() -> Result<RgbImage> {
     let recipe = chipped()?;
     let parts: Vec<RgbImage> = [ball(), ring(), bust()?]
@@ -168,7 +168,7 @@ fn regions() -> Result<RgbImage> {
     Ok(row(&parts))
 }
 
-/// The mesh coloured by its labels, those below `from` left white.
+/// The mesh coloured by its labels; labels below `from` are white.
 fn labelled(mesh: &TriangleMesh, labels: &[f64], far: f64, from: f64) -> Result<RgbImage> {
     let centres = TriangleMesh {
         vertices: mesh
@@ -200,7 +200,7 @@ fn labelled(mesh: &TriangleMesh, labels: &[f64], far: f64, from: f64) -> Result<
     Ok(render_mesh(mesh, &colour, &camera(), &options(SIDE))?)
 }
 
-/// Shares over the signed bins, negative ones first; both sides padded to `bins`.
+/// Fractions over the signed bins, negative ones first; both sides padded to `bins`.
 fn signed(of: &ContactDistribution, bins: usize) -> Vec<f64> {
     let at = |side: &[f64], k: usize| side.get(k).copied().unwrap_or_default();
     (0..bins)

@@ -1,4 +1,4 @@
-//! Figures 1 and 11: things carved from the solids of three photographs, in one picture.
+//! Figures 1 and 11: objects carved from the solids of three synthetic photographs, in one image.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -12,20 +12,20 @@ use stereology::volume::{Solid, turned};
 use super::carvings::{bowl, column, knot, slab, vase};
 use super::materials::{asphalt, foam, terrazzo};
 
-/// A mesh in its place, of a solid.
+/// A mesh at its place in the scene, and its solid.
 struct Thing<'a> {
     mesh: TriangleMesh,
     solid: &'a Solid,
-    /// The box that holds it, and nothing else.
+    /// A box that contains it and no other object.
     low: Point3<f64>,
     high: Point3<f64>,
 }
 
-/// Points within this distance of a thing belong to it; things are so far apart.
+/// Points within this distance of an object belong to it; objects are at least this far apart.
 const NEAR: f64 = 0.25;
 
 impl<'a> Thing<'a> {
-    /// `mesh` moved by `to`.
+    /// `mesh` translated by `to`.
     fn new(mesh: &TriangleMesh, to: [f64; 3], solid: &'a Solid) -> Result<Self> {
         let mesh = mesh.mapped(|p| p + Vector3::from(to));
         let (low, high) = mesh.bounding_box().context("a mesh without vertices")?;
@@ -82,7 +82,7 @@ pub fn draw_still_life(folder: &Path) -> Result<()> {
     picture(&things, &camera, &options, &folder.join("figure-01-scene.png"))
 }
 
-/// A knot on a column, and what was cut beside it, on steps.
+/// A knot on a column, and further objects on steps.
 pub fn draw_sculpture(folder: &Path) -> Result<()> {
     let (terrazzo, asphalt, foam) = (terrazzo()?.solid, asphalt()?.solid, foam()?.solid);
     let [step, height] = [70.0, 560.0];

@@ -1,4 +1,4 @@
-//! Figure 4: how likely a random section of a simple particle has which area.
+//! Figure 4: probability of each area of a random section through simple particles.
 
 use std::path::Path;
 

@@ -46,7 +46,7 @@ pub fn draw_blocks(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The picture of README: the sample, a section of its solid at the same scale, a block of it.
+/// The image of README: the sample, a section of its solid at the same scale, a block of it.
 pub fn draw_readme(folder: &Path) -> Result<()> {
     let made = solid()?;
     let side = 420;
@@ -63,7 +63,7 @@ pub fn draw_readme(folder: &Path) -> Result<()> {
         .context("README's picture cannot be written")
 }
 
-/// Pictures of one size beside each other.
+/// Images of one size side by side.
 pub fn row(parts: &[RgbImage]) -> RgbImage {
     let (width, height) = parts.first().map_or((0, 0), RgbImage::dimensions);
     let count = parts.len() as u32;
@@ -76,7 +76,7 @@ pub fn row(parts: &[RgbImage]) -> RgbImage {
 
 const GAP: u32 = 8;
 
-/// Figure 6: (a) part of the photograph, (b) its mean colours, (c) the residual, (d) a slice of its synthesis in 3D.
+/// Figure 6: (a) part of the image, (b) its mean colours, (c) the residual, (d) a slice of its synthesis in 3D.
 pub fn draw_residual(folder: &Path) -> Result<()> {
     let made = solid()?;
     let side = 320;

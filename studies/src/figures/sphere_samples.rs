@@ -1,27 +1,29 @@
-//! The distributions of figure 7, and profiles of spheres that have them: what ten equally spaced planes through a box of spheres at random places show.
+//! The distributions of figure 7, and the profiles of such spheres on ten equally spaced planes through a box of
+//! spheres at random positions.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
 
-/// Side of the box in largest diameters; planes are farther apart than any sphere is wide, so that none is cut twice.
+/// Side of the box in largest diameters; planes are farther apart than the largest diameter, so that no sphere is cut
+/// twice.
 pub const SIDE: f64 = 12.0;
-/// Planes through it.
+/// Number of planes.
 pub const PLANES: usize = 10;
-/// Area of all planes.
+/// Total area of the planes.
 pub const AREA: f64 = PLANES as f64 * SIDE * SIDE;
 
 /// A distribution of diameters on (0, 1].
 pub struct Diameters {
-    /// What it is called.
+    /// Name.
     pub name: &'static str,
-    /// Density of diameters, not scaled.
+    /// Density of diameters, not normalised.
     density: fn(f64) -> f64,
-    /// Profiles to be expected.
+    /// Expected number of profiles.
     profiles: f64,
 }
 
-/// The paper's four.
+/// The four distributions of the paper.
 pub const FIGURE_7: [Diameters; 4] = [
     Diameters {
         name: "single mode",
@@ -45,21 +47,21 @@ pub const FIGURE_7: [Diameters; 4] = [
     },
 ];
 
-/// Two narrow bands: what smooth estimates cannot do.
+/// Two narrow bands, which smooth estimates cannot represent.
 pub const TWO_BANDS: Diameters = Diameters {
     name: "two bands",
     density: |d| f64::from(u8::from((0.3..0.4).contains(&d) || (0.7..0.8).contains(&d))),
     profiles: 1200.0,
 };
 
-/// Where the choice between smooth and sparse fails: a band on a broad mode is neither.
+/// A band on a broad mode, which is neither smooth nor sparse.
 pub const BAND_ON_MODE: Diameters = Diameters {
     name: "band on a broad mode",
     density: |d| gauss(d, 0.40, 0.12) + f64::from(u8::from((0.74..0.78).contains(&d))) * 5.0,
     profiles: 1200.0,
 };
 
-/// And a tenth of the profiles: two modes look like two bands.
+/// With a tenth of the profiles two modes resemble two bands.
 pub const FEW: Diameters = Diameters {
     name: "bimodal with 125 profiles",
     density: |d| gauss(d, 0.30, 0.08) + gauss(d, 0.75, 0.08),
@@ -72,19 +74,19 @@ fn gauss(x: f64, mean: f64, deviation: f64) -> f64 {
 
 const STEPS: usize = 20_000;
 
-/// A distribution ready to be drawn from.
+/// A distribution prepared for sampling.
 pub struct Population {
     cumulative: Vec<f64>,
     /// Spheres per unit volume.
     pub number_density: f64,
-    /// Of the diameters.
+    /// Mean diameter.
     pub mean: f64,
-    /// Share of the volume in spheres.
+    /// Volume fraction of the spheres.
     pub volume_fraction: f64,
 }
 
 impl Diameters {
-    /// As many spheres as show the expected profiles: N_A = ⟨D⟩ N_V, eq. (1).
+    /// The number density that gives the expected number of profiles: N_A = ⟨D⟩ N_V, eq. (1).
     pub fn population(&self) -> Population {
         let at = |i: usize| (i as f64 + 0.5) / STEPS as f64;
         let whole: f64 = (0..STEPS).map(|i| (self.density)(at(i))).sum();
@@ -108,19 +110,19 @@ impl Diameters {
     }
 }
 
-/// Profiles of a sample.
+/// The profiles of a sample.
 #[derive(Default)]
 pub struct Profiles {
-    /// Their diameters.
+    /// Diameters of the profiles.
     pub sizes: Vec<f64>,
-    /// Those of the spheres they are cuts of.
+    /// Diameters of their spheres.
     pub cut: Vec<f64>,
-    /// The plane each is on.
+    /// Plane of each profile.
     pub planes: Vec<usize>,
 }
 
 impl Population {
-    /// A diameter.
+    /// Draws a diameter.
     pub fn draw(&self, rng: &mut ChaCha8Rng) -> f64 {
         let place: f64 = rng.random();
         let step = self.cumulative.partition_point(|c| *c < place).min(STEPS - 1);
@@ -141,7 +143,7 @@ impl Population {
             .collect()
     }
 
-    /// What the planes show.
+    /// Draws spheres and returns their profiles on the planes.
     pub fn profiles(&self, seed: u64) -> Profiles {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let expected = self.number_density * SIDE.powi(3);
@@ -167,7 +169,7 @@ impl Population {
     }
 }
 
-/// |error of the total| over it, and L1 distances of the histograms normalised by number and by volume.
+/// Relative |error of the total|, and L1 distances of the histograms normalised by number and by volume.
 pub fn scores(found: &[f64], truth: &[f64]) -> [f64; 3] {
     let bins = truth.len() as f64;
     let normalised = |values: Vec<f64>| {

@@ -1,4 +1,4 @@
-//! Volumes beside their exemplars, of textures that the project draws itself.
+//! Volumes beside their exemplars, synthetic textures.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -15,8 +15,8 @@ use stereology::pyramid::{
 };
 use stereology::render::{BlockOptions, render_block};
 
-/// Granite and terrazzo in the modes `slices` and `volume`, layered grains in the mode `oriented` from three pictures, each cube beside
-/// its exemplars.
+/// Granite and terrazzo in the modes `slices` and `volume`, layered grains in the mode `oriented` from three images,
+/// each cube beside its exemplars.
 pub fn draw(folder: &Path) -> Result<()> {
     let go = |_: f64| ControlFlow::Continue(());
     for (name, picture) in [("granite", granite()), ("terrazzo", terrazzo())] {
@@ -49,7 +49,7 @@ pub fn picture_of(volume: &Array4<f32>) -> Result<RgbImage> {
     Ok(render_block(&colour, sides, &BlockOptions::default())?)
 }
 
-/// Two pictures side by side, the left one enlarged by a whole factor or reduced to fit.
+/// Two images side by side, the left one enlarged by an integer factor or reduced to fit.
 pub fn beside(left: &RgbImage, right: &RgbImage) -> RgbImage {
     let height = right.height().max(left.height().min(256));
     let factor = (height / left.height()).max(1);
@@ -82,7 +82,7 @@ fn samples(picture: &RgbImage) -> Array3<f32> {
 
 const SIDE: u32 = 128;
 
-/// Smooths a periodic picture of colours 0 to 255 a little and adds noise.
+/// Slightly smooths a periodic image of colours 0 to 255 and adds noise.
 fn finished(seed: u64, noise: f64, colour: impl Fn(u32, u32) -> [f64; 3]) -> RgbImage {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     RgbImage::from_fn(SIDE, SIDE, |x, y| {
@@ -96,14 +96,14 @@ fn finished(seed: u64, noise: f64, colour: impl Fn(u32, u32) -> [f64; 3]) -> Rgb
     })
 }
 
-/// Random points of the picture.
+/// Random points of the image.
 fn points(rng: &mut ChaCha8Rng, count: usize) -> Vec<[f64; 2]> {
     (0..count)
         .map(|_| [0; 2].map(|_| f64::from(SIDE) * rng.random::<f64>()))
         .collect()
 }
 
-/// Distance on the periodic picture, rows stretched by `stretch`.
+/// Distance in the periodic image, with rows stretched by `stretch`.
 fn apart(a: [f64; 2], b: [f64; 2], stretch: f64) -> f64 {
     let d = [0, 1].map(|i| {
         let d = (a[i] - b[i]).abs();
@@ -146,8 +146,8 @@ fn terrazzo() -> RgbImage {
     })
 }
 
-/// A solid of flat grains, longer along x than along y and thin along z, cut normal to z (rows along y, columns along x), to y (rows
-/// along z, columns along x) and to x (rows along z, columns along y).
+/// A solid of flat grains, longer along x than along y and thin along z, cut normal to z (rows along y, columns along
+/// x), to y (rows along z, columns along x) and to x (rows along z, columns along y).
 fn flakes() -> [RgbImage; 3] {
     const LENGTHS: [f64; 3] = [14.0, 8.0, 3.5];
     let side = f64::from(SIDE);

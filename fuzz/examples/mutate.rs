@@ -29,7 +29,10 @@ fn main() {
         slowest = slowest.max(begin.elapsed());
         if outcome.is_err() || begin.elapsed() > Duration::from_secs(20) {
             std::fs::write("mutate-failure.bin", &bytes).expect("the case can be kept");
-            println!("case {cases} of seed {seed} ({target}) failed or took {:?}", begin.elapsed());
+            println!(
+                "case {cases} of seed {seed} ({target}) failed or took {:?}",
+                begin.elapsed()
+            );
             std::process::exit(1);
         }
         cases += 1;
@@ -111,8 +114,20 @@ fn raw(mesh: &TriangleMesh, kind: u8) -> Vec<u8> {
 /// Makes a few changes: bytes and numbers replaced, parts duplicated, removed or swapped, the end truncated.
 fn mutated(from: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     const WORDS: [&[u8]; 14] = [
-        b"nan", b"inf", b"-1", b"0", b"1e308", b"1e-308", b"4294967295", b"99999999999999999999", b"f 1 2 3 4 5 6", b"\\\n", b"//", b"\xff\xff\xff\xff",
-        b"\0\0\0\0", b"end_header\n",
+        b"nan",
+        b"inf",
+        b"-1",
+        b"0",
+        b"1e308",
+        b"1e-308",
+        b"4294967295",
+        b"99999999999999999999",
+        b"f 1 2 3 4 5 6",
+        b"\\\n",
+        b"//",
+        b"\xff\xff\xff\xff",
+        b"\0\0\0\0",
+        b"end_header\n",
     ];
     let mut bytes = from.to_vec();
     for _ in 0..rng.random_range(1..6) {

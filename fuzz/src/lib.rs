@@ -40,7 +40,9 @@ pub fn sweep(bytes: &[u8]) {
     let wide = kind % 4 == 0;
     let width = if wide { 24 } else { 3 };
     let vertices = usize::from(*count);
-    let Some((positions, corners)) = rest.split_at_checked(vertices * width) else { return };
+    let Some((positions, corners)) = rest.split_at_checked(vertices * width) else {
+        return;
+    };
     let coordinate = |bytes: &[u8]| match bytes {
         [x] => f64::from(*x % kind.saturating_add(2)),
         _ => f64::from_le_bytes(bytes.try_into().unwrap_or_default()),

@@ -1,4 +1,5 @@
-//! A photograph (or the built-in sample) to its solid: prints how its sections compare, writes one beside the photograph.
+//! A photograph (or the built-in sample) to its solid: prints how its sections compare, writes one beside the
+//! photograph.
 //!
 //! `cargo run --release --example synthesize -p stereology -- [PHOTO SHAPE OUT.png]`
 

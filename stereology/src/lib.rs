@@ -1,28 +1,30 @@
 //! From a photograph of a cut through a material to the solid it came from.
 //!
-//! Classical stereology turns a picture of particles in a binder (terrazzo, concrete, igneous rock, foam) into a faithful solid: profiles are
-//! segmented, their sizes unfolded to particles per volume, such particles packed into a box that repeats, coloured, and covered with the fine
-//! residual of the photograph (Jagnow, Dorsey & Rushmeier 2004). Each step is a crate of its own, re-exported here behind a feature of the same name:
+//! Classical stereology turns a photograph of particles in a binder (terrazzo, concrete, igneous rock, foam) into a
+//! solid: profiles are segmented, their sizes are unfolded to particles per volume, such particles are packed into a
+//! periodic box, coloured, and given the fine residual texture of the photograph (Jagnow, Dorsey & Rushmeier 2004).
+//! Each step is a crate of its own, re-exported here behind a feature of the same name:
 //!
 //! | module | question |
 //! |---|---|
-//! | [`shape`] | What is this particle's volume, width, section? |
-//! | [`grid`] | How do arrays get into files that others read? |
-//! | [`spectrum`] | What frequencies does a field hold? |
+//! | [`shape`] | What are the volume, width and sections of this particle? |
+//! | [`grid`] | How do I write arrays to files that other programs read? |
+//! | [`spectrum`] | Which frequencies does a field contain? |
 //! | [`imaging`] | Which pixels are connected, how far is each from the next region, what is its colour in Lab? |
-//! | [`kmatrix`] | How often does a random plane show a body at each size? |
-//! | [`unfold`] | Which particles per volume gave these profiles per area? |
+//! | [`kmatrix`] | What profile sizes does a random section through a body give? |
+//! | [`unfold`] | How many particles per volume gave these profiles per area? |
 //! | [`segment`] | Where are the profiles in a photograph? |
-//! | [`anneal`] | Where can particles lie without overlap, and what proves it? |
+//! | [`anneal`] | How can particles be packed without overlap, and what proves it? |
 //! | [`pyramid`] | What texture looks like this one? |
-//! | [`volume`] | Which colour is at this point of the solid? |
-//! | [`render`] | What does it look like? |
+//! | [`volume`] | What is the colour at this point of the solid? |
+//! | [`render`] | What does the solid look like? |
 //! | [`metrics`] | How similar are two samples, label maps or textures? |
 //! | [`exemplar`] | Which solid has slices like this image? |
 //! | [`grow`] | Which stone fills a mesh and agrees with measurements? |
 //! | [`microgeometry`] | Which relief on this mesh has the contact distribution of that picture? |
 //!
-//! The feature `pipeline` (default) adds [`pipeline`], which composes them, and [`files`], in which a solid is kept.
+//! The feature `pipeline` (default) adds [`pipeline`], which combines them, and [`files`], which reads and writes their
+//! results.
 //!
 //! # Examples
 //!

@@ -1,4 +1,4 @@
-//! Pictures of what the rooms make together: a packing, a mesh carved from a solid, lit as by [`render`](crate::render).
+//! Rendered images of a packing, and of a mesh carved from a solid; lit as by [`render`](crate::render).
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use stereology_render::{Camera, Material, RenderError, RenderOptions, render_mat
 use stereology_shape::{BodyKind, Particle, TriangleMesh, UnitBody};
 use stereology_volume::Solid;
 
-/// Picture of a mesh carved from a solid; voids are holes. `place` tells where in the solid a point of the mesh is and keeps lengths: identity, a shift, [`turned`](stereology_volume::turned).
+/// Image of a mesh carved from a solid; voids are holes. `place` maps a point of the mesh to the solid and preserves
+/// lengths: the identity, a shift, [`turned`](stereology_volume::turned).
 ///
 /// # Errors
 ///
@@ -52,9 +53,10 @@ pub fn picture_of_solid(
     render_material(mesh, &material, camera, options, progress)
 }
 
-/// Picture of the particles of a packing, each whole where its centre is in the box, coloured by `colour` of its index.
+/// Image of the particles of a packing, each drawn whole at its position in the box, with the colour of its index.
 ///
-/// Balls and ellipsoids are drawn with 320 or 1280 faces, meshes with their own. Cost: some seconds a million pixels, half a kilobyte a face.
+/// Spheres and ellipsoids are drawn with 320 or 1280 faces, meshes with their own. Cost: some seconds per million
+/// pixels, half a kilobyte per face.
 ///
 /// # Errors
 ///
@@ -117,7 +119,7 @@ fn outline(body: &UnitBody, subdivisions: u32) -> TriangleMesh {
     }
 }
 
-/// Which particle a point of the surface belongs to: the one whose surface is nearest.
+/// The particle of a point of the surface: the one whose surface is nearest.
 struct Owners<'a> {
     bodies: &'a [UnitBody],
     particles: &'a [Particle],

@@ -1,13 +1,14 @@
-//! The built-in sample: a section of a packing whose every particle is known.
+//! The built-in sample: a synthetic test image of a section through a known packing.
 
 use image::{ImageError, ImageFormat, RgbImage};
 use serde::Deserialize;
 
-/// The photograph, 912 × 672 pixels: slate and brick chips and larger ochre pebbles of two shapes in a pale binder, with texture, uneven light, blur and noise.
+/// The test image that stands for a photograph, 912 × 672 pixels: slate and brick chips and larger ochre pebbles of two
+/// shapes in a pale binder, with texture, uneven light, blur and noise.
 ///
 /// # Errors
 ///
-/// None in practice: the picture is part of the program.
+/// None in practice: the image is part of the program.
 ///
 /// # Examples
 ///
@@ -19,7 +20,7 @@ pub fn photo() -> Result<RgbImage, ImageError> {
     Ok(image::load_from_memory_with_format(PHOTO, ImageFormat::Png)?.into_rgb8())
 }
 
-/// What is true of the solid that [`photo`] was cut from. Lengths in pixels.
+/// The solid that [`photo`] is a section of. Lengths in pixels.
 ///
 /// # Errors
 ///
@@ -43,15 +44,15 @@ const TRUTH: &[u8] = include_bytes!("../assets/sample.json");
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[non_exhaustive]
 pub struct Truth {
-    /// Shapes of the particles and their shares by number.
+    /// Shapes of the particles and their fractions by number.
     pub shapes: Vec<ShapeShare>,
     /// Particles per unit volume.
     pub total_number_density: f64,
     /// Their mean size.
     pub mean_size: f64,
-    /// Share of the volume inside particles.
+    /// Volume fraction of the particles.
     pub volume_fraction: f64,
-    /// Share of the photograph inside profiles.
+    /// Area fraction of the profiles.
     pub area_fraction: f64,
     /// Edges of size bins.
     pub edges: Vec<f64>,
@@ -61,17 +62,17 @@ pub struct Truth {
     pub categories: Vec<TrueCategory>,
     /// Mean colour of the binder, sRGB-encoded / 255.
     pub binder: [f64; 3],
-    /// Sizes of the profiles on the photograph, as one period shows them.
+    /// Sizes of the profiles of one period.
     pub profile_sizes: Vec<f64>,
 }
 
-/// A shape and its share of the particles.
+/// A shape and its fraction of the particles.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[non_exhaustive]
 pub struct ShapeShare {
-    /// What it is.
+    /// Specification of the shape.
     pub shape: String,
-    /// Its share by number.
+    /// Its fraction by number.
     pub share: f64,
 }
 
@@ -79,7 +80,7 @@ pub struct ShapeShare {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[non_exhaustive]
 pub struct TrueCategory {
-    /// What people would call it.
+    /// Name of the colour.
     pub name: String,
     /// Its mean colour, sRGB-encoded / 255.
     pub colour: [f64; 3],

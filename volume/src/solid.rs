@@ -64,6 +64,9 @@ struct Fields {
     voxel: f64,
 }
 
+/// Largest number of points per pixel along each axis.
+const MOST_BORDER_SAMPLES: u32 = 16;
+
 /// Why particles, colours and residual do not make a solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -146,6 +149,9 @@ pub enum SolidError {
         /// Edge of a pixel.
         pixel: f64,
     },
+    /// Too few or too many points per pixel.
+    #[error("{0} points per pixel along each axis; 1 to {MOST_BORDER_SAMPLES} are possible")]
+    BorderSamples(u32),
     /// The residual does not repeat with the box.
     #[error(
         "the box's side of {side} along {axis} is no multiple of the residual's period of {period}; round the box, or the solid would have a seam"
@@ -205,13 +211,19 @@ impl Solid {
         Self { lookup, ..self }
     }
 
-    /// Pictures look at n × n points of a pixel on the border of a particle; 4 unless said otherwise, 1 (or 0) for none.
-    #[must_use]
-    pub fn with_border_samples(self, n: u32) -> Self {
-        Self {
-            border_samples: n.clamp(1, 16),
-            ..self
+    /// Images take the mean of n × n points of a pixel on the border of a particle: from 1 (the centre only) to 16; the default is 4.
+    ///
+    /// # Errors
+    ///
+    /// [`SolidError::BorderSamples`] for other numbers.
+    pub fn with_border_samples(self, n: u32) -> Result<Self, SolidError> {
+        if !(1..=MOST_BORDER_SAMPLES).contains(&n) {
+            return Err(SolidError::BorderSamples(n));
         }
+        Ok(Self {
+            border_samples: n,
+            ..self
+        })
     }
 
     /// The same solid in its mean colours alone, as in figure 5 (a).

@@ -13,8 +13,8 @@ use stereology::files;
 use stereology::grid::Format;
 use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{
-    self, Check, CheckName, Comparison, Extent, Level, Opinion, ParticleTypes, Synthesis, SynthesisError,
-    SynthesisOptions, Verdict,
+    self, Check, CheckName, Comparison, DensityError, Extent, Level, Opinion, ParticleTypes, PopulationFailure,
+    Synthesis, SynthesisError, SynthesisOptions, Verdict,
 };
 use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
@@ -420,6 +420,12 @@ impl Synthesize {
                 None => Failure::run(error),
             },
             other if other.is_cancelled() => Failure::stopped(),
+            SynthesisError::Population(error @ PopulationFailure::Side { .. }) => {
+                Failure::run(format!("{error} (--box or --count)"))
+            }
+            SynthesisError::Densities(error @ DensityError::NoProfiles(_)) => {
+                Failure::run(format!("{error} (--edge-rule)"))
+            }
             other => Failure::run(other),
         }
     }

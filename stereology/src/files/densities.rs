@@ -1,5 +1,6 @@
-//! `densities.csv`: particles per unit volume by size bin. Columns `lower_edge,upper_edge,number_density,lower,upper,type,category`; `type` and `category` are
-//! empty for sums over them.
+//! `densities.csv`: particles per unit volume by size bin. Columns
+//! `lower_edge,upper_edge,number_density,lower,upper,type,category`; `type` and `category` are empty for sums over
+//! them.
 
 use crate::files::FileError;
 use crate::pipeline::ParticleDensities;
@@ -63,7 +64,8 @@ pub struct DensityRows {
 }
 
 impl DensityRows {
-    /// Adds the bins of an unfolding with their intervals; `None` for a type or category means all together, an empty field.
+    /// Adds the bins of an unfolding with their intervals; `None` for a type or category means all together, an empty
+    /// field.
     pub fn unfolding(&mut self, unfolding: &Unfolding, particle_type: Option<usize>, category: Option<usize>) {
         let intervals = unfolding
             .intervals
@@ -146,11 +148,13 @@ type Key = (Option<usize>, Option<u8>);
 
 /// Reads a table with the columns `lower_edge,upper_edge,number_density` and, optionally, `type` and `category`.
 ///
-/// Rows without a category are sums over the categories and are left out if other rows have a category; likewise for types.
+/// Rows without a category are sums over the categories and are left out if other rows have a category; likewise for
+/// types.
 ///
 /// # Errors
 ///
-/// [`FileError`] with the line: a missing column, a value that is not a number, bins that do not follow each other, no density above zero.
+/// [`FileError`] with the line: a missing column, a value that is not a number, bins that do not follow each other, no
+/// density above zero.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<DensityHistogram>, FileError> {
     let path = path.as_ref();
     parse(path).map_err(|what| FileError::value(path, what))

@@ -1,7 +1,7 @@
 //! Files of profiles, densities, packings and solids: one module per format, with its `write` and its `read`.
 //!
-//! Lengths are in the unit of the run, colours are sRGB-encoded values / 255. Files hold neither times nor paths. Every file is written completely or not at
-//! all, and numbers are read back bit for bit.
+//! Lengths are in the unit of the run, colours are sRGB-encoded values / 255. Files hold neither times nor paths. Every
+//! file is written completely or not at all, and numbers are read back bit for bit.
 //!
 //! | module | file | content |
 //! |---|---|---|

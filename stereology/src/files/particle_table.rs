@@ -48,7 +48,8 @@ pub fn write(path: impl AsRef<Path>, particles: &[Particle]) -> Result<(), FileE
 ///
 /// # Errors
 ///
-/// [`FileError`] with the line: a missing column, a value that is not a finite number, an orientation that is not a unit quaternion.
+/// [`FileError`] with the line: a missing column, a value that is not a finite number, an orientation that is not a
+/// unit quaternion.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<Particle>, FileError> {
     let path = path.as_ref();
     parse(path).map_err(|what| FileError::value(path, what))
@@ -99,7 +100,8 @@ fn parse(path: &Path) -> Result<Vec<Particle>, String> {
     Ok(particles)
 }
 
-/// The rotation of a quaternion w, x, y, z as written: a second normalisation could change the last bit. `None` unless its norm is 1.
+/// The rotation of a quaternion w, x, y, z as written: a second normalisation could change the last bit. `None` unless
+/// its norm is 1.
 pub(crate) fn orientation(q: [f64; 4]) -> Option<UnitQuaternion<f64>> {
     let [w, i, j, k] = q;
     let norm: f64 = q.iter().map(|c| c * c).sum();

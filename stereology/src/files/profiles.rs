@@ -1,5 +1,6 @@
-//! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`, `slice`, `touches_edge` and the bounding box
-//! `left,top,right,bottom` are optional, other columns are ignored, and so are lines that begin with `#`.
+//! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`,
+//! `slice`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored, and so
+//! are lines that begin with `#`.
 
 use crate::files::FileError;
 use std::fs::File;

@@ -1,4 +1,5 @@
-//! `texture.npy`: the residual volume of a solid, axes (z, y, x, channel), f32; channels 0-2 are the binder's residual, 3-5 that of the particles.
+//! `texture.npy`: the residual volume of a solid, axes (z, y, x, channel), f32; channels 0-2 are the binder's residual,
+//! 3-5 that of the particles.
 
 use crate::files::FileError;
 use ndarray::{Array4, Axis, Ix4, concatenate};

@@ -9,7 +9,8 @@ use std::path::Path;
 use stereology_shape::{Arrangement, Body, BodyError, ClosedMesh, TriangleMesh, UnitBody};
 use stereology_volume::{Residual, Solid, SolidError};
 
-/// `solid.json`: the colours of a packing. The particles are in `packing.json`, the residual is in `texture.npy` beside it.
+/// `solid.json`: the colours of a packing. The particles are in `packing.json`, the residual is in `texture.npy` beside
+/// it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct SolidFile {
     schema: String,

@@ -1,5 +1,6 @@
-//! Values at points or voxels as a CSV table: rows of x, y, z and one value per channel. A header is optional: its columns x, y, z, and r, g, b of three channels,
-//! may be in any order; other value columns keep theirs. Lines that begin with `#` are ignored.
+//! Values at points or voxels as a CSV table: rows of x, y, z and one value per channel. A header is optional: its
+//! columns x, y, z, and r, g, b of three channels, may be in any order; other value columns keep theirs. Lines that
+//! begin with `#` are ignored.
 
 use crate::files::FileError;
 use std::io::Write;
@@ -36,7 +37,8 @@ pub enum ValueRange {
     Bytes,
 }
 
-/// Writes a table with the header `x,y,z,...`, completely or not at all; values are `r,g,b` of three channels, otherwise `value`.
+/// Writes a table with the header `x,y,z,...`, completely or not at all; values are `r,g,b` of three channels,
+/// otherwise `value`.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! Particles as VTK poly data, for ParaView: one point per particle, for glyphs, with its size, shape, category and orientation w, x, y, z.
+//! Particles as VTK poly data, for ParaView: one point per particle, for glyphs, with its size, shape, category and
+//! orientation w, x, y, z.
 
 use crate::files::FileError;
 use crate::files::particle_table::orientation;
@@ -81,7 +82,8 @@ fn array(
 ///
 /// # Errors
 ///
-/// [`FileError`]: a missing array, arrays of different lengths, a value that is not a number, an orientation that is not a unit quaternion.
+/// [`FileError`]: a missing array, arrays of different lengths, a value that is not a number, an orientation that is
+/// not a unit quaternion.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<Particle>, FileError> {
     let path = path.as_ref();
     let text = std::fs::read_to_string(path).map_err(|error| FileError::io(path, error))?;

@@ -1,5 +1,5 @@
-//! Particles as extended XYZ, for OVITO: the box as lattice, orientations x, y, z, w, and the semi-axes of ellipsoids. The species is `X`, which is not an
-//! element: readers made for atoms (ASE) refuse unknown names.
+//! Particles as extended XYZ, for OVITO: the box as lattice, orientations x, y, z, w, and the semi-axes of ellipsoids.
+//! The species is `X`, which is not an element: readers made for atoms (ASE) refuse unknown names.
 
 use crate::files::FileError;
 use crate::files::particle_table::orientation;
@@ -59,7 +59,8 @@ pub fn write(path: impl AsRef<Path>, arrangement: &Arrangement) -> Result<(), Fi
 ///
 /// # Errors
 ///
-/// [`FileError`] with the line: another lattice or other properties, a value that is not a number, an orientation that is not a unit quaternion.
+/// [`FileError`] with the line: another lattice or other properties, a value that is not a number, an orientation that
+/// is not a unit quaternion.
 pub fn read(path: impl AsRef<Path>) -> Result<(Vec<Particle>, PeriodicBox), FileError> {
     let path = path.as_ref();
     let text = std::fs::read_to_string(path).map_err(|error| FileError::io(path, error))?;

@@ -1,19 +1,19 @@
-//! Which colour each particle gets: that of a profile of its category, of about its size.
+//! Colours of the particles: each gets that of a profile of its category and of similar size.
 
-#![allow(clippy::cast_possible_truncation, reason = "colours are f32 in a solid")]
-
+use crate::pipeline::narrowing::single;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology_anneal::Packing;
 use stereology_segment::Profile;
 use stereology_shape::Particle;
 
-/// The mean colour of a randomly chosen profile for each particle, drawn from those of its category that are nearest to it in size: section 4.2.
+/// For each particle the mean colour of a random profile, drawn from those of its category that are nearest in size:
+/// section 4.2.
 ///
-/// The paper draws from all of a category. Where colours inside a category still differ by size (black dust and teal slabs that are both dark), that paints
-/// the few large particles in the colours of the many small ones; a fifth of the category, at least a dozen, is drawn from instead. `pixel` is the size of a
-/// pixel in the packing's unit of length. Profiles outside the counting frame have colours too and are drawn as well; a category without profiles takes from
-/// all.
+/// The paper draws from all profiles of a category. Where colours within a category vary with size (black dust and teal
+/// slabs, both dark), that gives the few large particles the colours of the many small ones. Here a fifth of the
+/// category, at least a dozen profiles, is drawn from. `pixel` is the size of a pixel in the unit of length of the
+/// packing. Profiles outside the counting frame are drawn too; a category without profiles draws from all.
 ///
 /// # Examples
 ///
@@ -58,14 +58,14 @@ pub fn particle_colours(packing: &Packing, profiles: &[Profile], pixel: f64, see
         let middle = from.partition_point(|profile| profile.size * pixel < TYPICAL_PROFILE * particle.size);
         let first = middle.saturating_sub(few / 2).min(from.len() - few);
         let drawn = from.get(first + rng.random_range(0..few.max(1)));
-        drawn.map_or([0.5; 3], |profile| profile.colour.map(|c| c as f32))
+        drawn.map_or([0.5; 3], |profile| profile.colour.map(single))
     };
     packing.particles().iter().map(&mut draw).collect()
 }
 
-/// Fewest profiles that a colour is drawn from, if there are so many.
+/// Smallest number of profiles that a colour is drawn from, if the category has as many.
 const FEWEST: usize = 12;
-/// A profile is this large on the average over the sections of a particle of size 1: π / 4 for spheres.
+/// Mean profile size of a particle of size 1: π / 4 for spheres.
 const TYPICAL_PROFILE: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Random streams of the pipeline, apart from those of the rooms.

@@ -22,7 +22,8 @@ pub struct ParticleDensities {
     pub by_type: Vec<Unfolding>,
     /// Each colour category unfolded separately, if that was requested or sizes differ between categories.
     pub categories: Option<CategoryDensities>,
-    /// Number density by category and size bin, from which a solid is populated; `None` in bins wholly below the threshold. Category c is entry c.
+    /// Number density by category and size bin, from which a solid is populated; `None` in bins wholly below the
+    /// threshold. Category c is entry c.
     pub by_category: Vec<Vec<Option<f64>>>,
     /// Whether sizes differ between colour categories.
     pub association: Association,
@@ -51,18 +52,22 @@ pub struct CategoryDensities {
 
 /// Unfolds profiles to particles per volume.
 ///
-/// First the size bins, the threshold, the capping angle and the fractions of the types are settled ([`DensityOptions`]). Then:
+/// First the size bins, the threshold, the capping angle and the fractions of the types are settled
+/// ([`DensityOptions`]). Then:
 ///
-/// - If the type of every profile is known (`profiles.types`) and there are several types, each type is unfolded with its own kernel, eq. (9), and `all` is
-///   their sum. Otherwise all profiles are unfolded with the joint kernel of `types`, eqs. (10)-(12).
-/// - Where sizes differ between colour categories (Kruskal-Wallis, p below 0.01), each category is also unfolded separately on the same bins, section 4.2.
-///   Otherwise all categories have the same size distribution, and each has its fraction of the profiles.
+/// - If the type of every profile is known (`profiles.types`) and there are several types, each type is unfolded with
+///   its own kernel, eq. (9), and `all` is their sum. Otherwise all profiles are unfolded with the joint kernel of
+///   `types`, eqs. (10)-(12).
+/// - Where sizes differ between colour categories (Kruskal-Wallis, p below 0.01), each category is also unfolded
+///   separately on the same bins, section 4.2. Otherwise all categories have the same size distribution, and each has
+///   its fraction of the profiles.
 ///
 /// A category with no profile above the threshold has zero density.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: no counted profile, sizes beyond the largest, invalid bins, profiles of unknown types, types without profiles, a cancelled run.
+/// [`DensityError`]: no counted profile, sizes beyond the largest, invalid bins, profiles of unknown types, types
+/// without profiles, a cancelled run.
 ///
 /// # Examples
 ///

@@ -6,7 +6,8 @@ use stereology_unfold::UnfoldOptions;
 /// Options of [`unfold_profiles`](crate::pipeline::unfold_profiles).
 #[derive(Clone, Debug, PartialEq)]
 pub struct DensityOptions {
-    /// Number of size bins between 0 and the largest size; 0: as many as the profiles allow ([`automatic_bins`](stereology_unfold::automatic_bins)).
+    /// Number of size bins between 0 and the largest size; 0: as many as the profiles allow
+    /// ([`automatic_bins`](stereology_unfold::automatic_bins)).
     pub bins: usize,
     /// Spacing of the size bins.
     pub spacing: Spacing,
@@ -27,7 +28,8 @@ pub struct DensityOptions {
 }
 
 impl Default for DensityOptions {
-    /// 16 bins (ten leave steps in the profile sizes of the sections), sizes spread over them, the default estimator without intervals.
+    /// 16 bins (ten leave steps in the profile sizes of the sections), sizes spread over them, the default estimator
+    /// without intervals.
     fn default() -> Self {
         Self {
             bins: 16,

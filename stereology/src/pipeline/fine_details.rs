@@ -1,4 +1,4 @@
-//! The residual of the photograph, synthesised again in three dimensions: section 4.3.
+//! The residual of the photograph, resynthesised in three dimensions: section 4.3.
 
 use ndarray::{Array2, Array4, Axis};
 use stereology_metrics::{Finding, Progress};
@@ -6,24 +6,27 @@ use stereology_pyramid::{Exemplar, TextureError, TextureOptions, TextureReport, 
 use stereology_segment::Segmentation;
 use stereology_volume::Residual;
 
-/// The residual volumes of binder and particles, and how well their slices match the photograph.
+/// The residual volumes of binder and particles, and reports on their slices.
 #[derive(Clone, Debug)]
 pub struct FineDetails {
     /// The volumes.
     pub residual: Residual,
-    /// Report on the binder's; `None` if the photograph shows too little binder to tell.
+    /// Report on that of the binder; `None` if the photograph shows too little of it.
     pub binder: Option<TextureReport>,
-    /// Report on the particles'; `None` if they are too small to tell.
+    /// Report on that of the particles; `None` if they are too small.
     pub particles: Option<TextureReport>,
-    /// What to know.
+    /// Remarks.
     pub findings: Vec<Finding>,
 }
 
-/// Synthesises tileable residual volumes of `voxels`³ at the photograph's pixel scale, one from the pixels of the binder, one from those of all particles.
+/// Synthesises periodic residual volumes of `voxels`³ at the pixel scale of the photograph, one from the pixels of the
+/// binder, one from those of all particles.
 ///
-/// The two are told apart because a particle's inside looks unlike the binder; particles are pooled because one profile alone is too small a sample (the
-/// paper's own finding). Pixels near a border belong to neither, since blur mixes both there; nor do pixels of the binder whose colour is nearer to a
-/// category of particles, with those around them: these are particles too small to be profiles, which would come back as specks. The period is `voxels` × `pixel`, whatever the photograph's size.
+/// Binder and particles have volumes of their own because they look different; all particles share one because a single
+/// profile is too small a sample (as the paper found). Pixels near a border are left out, because blur mixes both
+/// there. So are pixels of the binder whose colour is nearer to a category of particles, and the pixels around them:
+/// these are particles too small to be profiles, which would appear as specks. The period is `voxels` × `pixel`,
+/// whatever the size of the photograph.
 ///
 /// # Errors
 ///
@@ -68,7 +71,7 @@ pub fn fine_details(
             .filter(|(label, fine)| of(label, fine))
             .count() as f64
     };
-    // If more than a few pixels look like fines, binder and particles share their colours, and these pixels are the binder's own.
+    // If many pixels look like fines, binder and particles have common colours, and these pixels belong to the binder.
     let few_fines = count(&|_, fine| *fine) < MOST_FINES * count(&|label, _| *label == 0);
     let no_fines = if few_fines {
         far_from(&fines, BORDER)
@@ -89,7 +92,12 @@ pub fn fine_details(
                 Ok((volume, Some(report)))
             }
             Err(TextureError::MaskTooSmall { .. }) => {
-                findings.push(Finding::new("no-texture", format!("the photograph shows too few pixels inside the {of} to learn its texture from; it was left plain")));
+                findings.push(Finding::new(
+                    "no-texture",
+                    format!(
+                        "too few pixels of the photograph lie inside the {of} to learn its texture; it was left plain"
+                    ),
+                ));
                 Ok((Array4::zeros([voxels, voxels, voxels, 3]), None))
             }
             Err(error) => Err(error),
@@ -110,9 +118,9 @@ pub fn fine_details(
     })
 }
 
-/// Largest share of the binder's pixels that missed fines can be.
+/// Largest fraction of the binder's pixels that can be missed fines.
 const MOST_FINES: f64 = 0.05;
-/// How many pixels from a border blur reaches.
+/// Reach of blur from a border, in pixels.
 const BORDER: usize = 2;
 
 /// Pixels that touch another label.
@@ -133,7 +141,7 @@ fn missed_fines(segmentation: &Segmentation) -> Array2<bool> {
     let photo = segmentation.photo();
     let binder = segmentation.binder.colour;
     Array2::from_shape_fn(segmentation.labels.dim(), |(y, x)| {
-        #[allow(clippy::cast_possible_truncation, reason = "a picture's sides are u32")]
+        #[allow(clippy::cast_possible_truncation, reason = "the sides of an image are u32")]
         let pixel = photo.get_pixel(x as u32, y as u32).0.map(|c| f64::from(c) / 255.0);
         let own = distance(pixel, binder);
         segmentation.labels[[y, x]] == 0
@@ -144,7 +152,7 @@ fn missed_fines(segmentation: &Segmentation) -> Array2<bool> {
     })
 }
 
-/// Where no marked pixel lies within `reach` pixels along rows and columns.
+/// Pixels with no marked pixel within `reach` rows and columns.
 fn far_from(marked: &Array2<bool>, reach: usize) -> Array2<bool> {
     let spread = |marked: &Array2<bool>, axis: Axis| {
         let mut near = marked.clone();
@@ -165,7 +173,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// As many pixels are far as lie outside the union of the squares about the marked ones.
+        /// The far pixels are those outside the union of the squares around the marked ones.
         #[test]
         fn far_is_outside_every_square(marks in prop::collection::vec((0_usize..20, 0_usize..30), 0..6), reach in 0_usize..5) {
             let mut marked = Array2::from_elem((20, 30), false);

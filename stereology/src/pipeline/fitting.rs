@@ -1,5 +1,5 @@
-//! What all fits of one table of profiles have in common: size bins, threshold, capping angle, fractions of the types; counts and kernels of any part of the
-//! profiles.
+//! What all fits of one table of profiles have in common: size bins, threshold, capping angle, fractions of the types;
+//! counts and kernels of any part of the profiles.
 
 use std::borrow::Cow;
 
@@ -169,8 +169,8 @@ impl<'a> Fitting<'a> {
             .collect()
     }
 
-    /// Edges for histograms of profiles: the reported bins in halves, with an edge at the threshold; finer bins would be too noisy with some hundred
-    /// profiles. `None` where the fit has no finer bins.
+    /// Edges for histograms of profiles: the reported bins in halves, with an edge at the threshold; finer bins would
+    /// be too noisy with some hundred profiles. `None` where the fit has no finer bins.
     pub(crate) fn histogram_edges(&self) -> Option<Vec<f64>> {
         let finer = self.unfold.method != Method::Paper;
         finer.then(|| divided_edges(&self.edges, 2 * (self.edges.len() - 1), self.threshold))
@@ -187,8 +187,8 @@ fn with_threshold(options: &UnfoldOptions, threshold: f64) -> UnfoldOptions {
 
 /// The threshold, raised to the upper edge of its bin if that edge is less than [`OBSERVED`] times the threshold.
 ///
-/// A section of a sphere of diameter D is larger than t with probability √(1 − (t / D)²). Where that is small, few profiles constrain the density, which is
-/// then ill-determined.
+/// A section of a sphere of diameter D is larger than t with probability √(1 − (t / D)²). Where that is small, few
+/// profiles constrain the density, which is then ill-determined.
 fn settled_threshold(size_edges: &[f64], threshold: f64) -> f64 {
     let bin = size_edges
         .windows(2)

@@ -1,7 +1,7 @@
 //! The chain from a photograph to its solid, which combines the other crates.
 //!
-//! [`synthesize`] runs the whole chain. Its steps can be called separately: [`measured_profiles`], [`unfold_profiles`], [`population`], [`fine_details`],
-//! [`verify`], [`residual_spectra`]. [`Verdict`] judges the result.
+//! [`synthesize`] runs the whole chain. Its steps can be called separately: [`measured_profiles`], [`unfold_profiles`],
+//! [`population`], [`fine_details`], [`verify`], [`residual_spectra`]. [`Verdict`] judges the result.
 
 mod association;
 mod colouring;
@@ -11,6 +11,7 @@ mod fine_details;
 mod finish_grown;
 mod fitting;
 mod measured_profiles;
+mod narrowing;
 mod particle_types;
 mod population;
 mod residual_spectra;

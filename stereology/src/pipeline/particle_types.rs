@@ -72,13 +72,15 @@ pub enum ParticleTypesError {
     Kernel(#[from] KernelError),
 }
 
-/// Largest standard error of a kernel's entries, relative to a column sum of 1: well below the counting error of some hundred profiles.
+/// Largest standard error of a kernel's entries, relative to a column sum of 1: well below the counting error of some
+/// hundred profiles.
 const LAW_TOLERANCE: f64 = 2e-3;
 
 impl ParticleTypes {
     /// Types from names, bodies and shares; the shares are scaled to sum to 1.
     ///
-    /// Computes the section law of each body: closed form for spheres and ellipsoids, up to some seconds for a mesh of many triangles.
+    /// Computes the section law of each body: closed form for spheres and ellipsoids, up to some seconds for a mesh of
+    /// many triangles.
     ///
     /// # Errors
     ///
@@ -113,8 +115,8 @@ impl ParticleTypes {
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError::Shares`] unless there is one share per type; [`ParticleTypesError::Share`] for a share that is negative or not finite, or if
-    /// all are zero.
+    /// [`ParticleTypesError::Shares`] unless there is one share per type; [`ParticleTypesError::Share`] for a share
+    /// that is negative or not finite, or if all are zero.
     ///
     /// ```
     /// use stereology::pipeline::ParticleTypes;
@@ -153,7 +155,8 @@ impl ParticleTypes {
         Self { types: types.collect() }
     }
 
-    /// Types from their specifications, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`, `rock:SEED`, a mesh file.
+    /// Types from their specifications, in equal shares: `sphere`, `ellipsoid:A,B,C`, `box:A,B,C`, `cylinder:D,L`,
+    /// `rock:SEED`, a mesh file.
     ///
     /// # Errors
     ///
@@ -184,7 +187,8 @@ impl ParticleTypes {
         self.types.iter().map(|of| UnitBody::new(&of.body)).collect()
     }
 
-    /// Joint kernel of the types, Σ P(i) H_i K_i, in units of length: eqs. (10)-(12). For one type it is H K of eq. (5).
+    /// Joint kernel of the types, Σ P(i) H_i K_i, in units of length: eqs. (10)-(12). For one type it is H K of eq.
+    /// (5).
     ///
     /// # Errors
     ///
@@ -228,7 +232,8 @@ impl ParticleType {
     ///
     /// # Examples
     ///
-    /// A sphere of diameter 2 shows a profile below diameter 1 with probability 1 - √3/2, and has a caliper of 2: eqs. (2), (3).
+    /// A sphere of diameter 2 shows a profile below diameter 1 with probability 1 - √3/2, and has a caliper of 2: eqs.
+    /// (2), (3).
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes};
@@ -258,7 +263,8 @@ impl ParticleType {
     }
 }
 
-/// Closed form for spheres and ellipsoids; for meshes sections are integrated until the error of the kernel is below [`LAW_TOLERANCE`].
+/// Closed form for spheres and ellipsoids; for meshes sections are integrated until the error of the kernel is below
+/// [`LAW_TOLERANCE`].
 fn section_law(name: &str, body: &Body) -> Result<SectionLaw, ParticleTypesError> {
     SectionLaw::of_body(body, &SectionOptions::default().with_tolerance(LAW_TOLERANCE)).map_err(|error| {
         ParticleTypesError::Law {

@@ -1,4 +1,4 @@
-//! How large the box that repeats is, and which particles go into it.
+//! The size of the periodic box, and the particles that go into it.
 
 use crate::pipeline::{ParticleDensities, ParticleTypes};
 use nalgebra::Vector3;
@@ -7,7 +7,7 @@ use stereology_kmatrix::Sizes;
 use stereology_metrics::Finding;
 use stereology_shape::{BoxError, PeriodicBox};
 
-/// How large the solid is.
+/// The size of the solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Extent {
     /// Side of the box: 4 × the largest particle, or more to hold 5,000 particles.
@@ -15,11 +15,11 @@ pub enum Extent {
     Auto,
     /// Side of the box; rounded to whole periods of the texture.
     Side(f64),
-    /// Number of particles; nearly, since the box is rounded to whole periods of the texture.
+    /// Approximate number of particles: the box is rounded to whole periods of the texture.
     Count(usize),
 }
 
-/// Particles without a place, and their box.
+/// Particles without positions, and their box.
 #[derive(Clone, Debug)]
 pub struct Population {
     /// The particles.
@@ -28,48 +28,51 @@ pub struct Population {
     pub period: PeriodicBox,
     /// Volume fraction of the particles in the box.
     pub fraction: f64,
-    /// Volume fraction that the densities give by themselves.
+    /// Volume fraction of the unfolded densities.
     pub unfolded_fraction: f64,
-    /// Densities were multiplied by this to meet the photograph's area fraction (Delesse: V_V = A_A).
+    /// Factor by which the densities were multiplied to give the requested fraction, by default the photograph's area
+    /// fraction (Delesse: V_V = A_A).
     pub density_factor: f64,
     /// What was rounded or left out.
     pub findings: Vec<Finding>,
 }
 
-/// A population that cannot be.
+/// Why no population can be drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PopulationFailure {
-    /// No particles were found.
-    #[error("the unfolded densities hold no particles above the threshold; check the segmentation, or take fewer bins")]
+    /// No particles above the threshold.
+    #[error("the unfolded densities hold no particles above the threshold; check the segmentation, or use fewer bins")]
     Nothing,
-    /// A box too small for its largest particle, or beyond what can be held.
-    #[error("the box of side {side:.4} {why}; choose another --box or --count")]
+    /// A box too small for its largest particle, or with too many particles.
+    #[error("the box of side {side:.4} {why}; choose another side or number of particles")]
     Side {
         /// The side.
         side: f64,
-        /// What is wrong with it.
+        /// The reason.
         why: String,
     },
-    /// The sides of the box.
+    /// Invalid sides of the box.
     #[error(transparent)]
     Box(#[from] BoxError),
-    /// The particles.
+    /// Invalid densities or sizes.
     #[error(transparent)]
     Population(#[from] PopulationError),
 }
 
 const ENOUGH_PARTICLES: f64 = 5_000.0;
 const MOST_PARTICLES: f64 = 50_000.0;
-/// A box that holds so many would be left with its few largest particles.
+/// A box with more particles than this would keep only its few largest.
 const HOPELESS: f64 = 1e9;
-/// Beyond this the area fraction and the unfolded volume fraction contradict each other.
+/// Relative difference of area fraction and unfolded volume fraction that gives a warning: the standard error of both
+/// with some hundred profiles.
 const FRACTION_TOLERANCE: f64 = 0.1;
 
-/// The particles of a box: counts from the densities, scaled so that their volume is `fraction` of it; sizes spread over each bin, kept whole.
+/// The particles of a box: whole numbers from the densities, scaled so that their volume is `fraction` of the box;
+/// sizes are spread over each bin.
 ///
-/// `texture_period` is the length after which the residual repeats; the box's side is a multiple of it. Beyond 50,000 particles the smallest are left out,
-/// and the fraction is then less by their volume.
+/// `texture_period` is the period of the residual; the side of the box is a multiple of it. Beyond 50,000 particles the
+/// smallest are left out, and the fraction decreases by their volume.
 ///
 /// # Errors
 ///
@@ -120,7 +123,7 @@ pub fn population(
             "fraction-mismatch",
             format!(
                 "the unfolded particles fill {unfolded_fraction:.3} of the volume, the photograph's profiles cover {fraction:.3} of its area: densities were \
-                 multiplied by {density_factor:.3}. The assumed shape, the largest size or the segmentation is off"
+                 multiplied by {density_factor:.3}. Check the assumed shape, the largest size and the segmentation"
             ),
         ));
     }
@@ -140,7 +143,7 @@ pub fn population(
     let kept_volume: f64 = kept.iter().map(Bin::volume).sum();
     let all_volume: f64 = observable_bins(densities).iter().map(Bin::volume).sum();
     let fraction = fraction * kept_volume / all_volume;
-    // Rounding to whole particles changed the volume a little; sizes take it up, all by one factor.
+    // Rounding to whole particles changed the volume slightly; one factor on all sizes restores it.
     scale_to_fraction(&bodies, &mut grains, &period, fraction)?;
     Ok(Population {
         grains,
@@ -152,7 +155,7 @@ pub fn population(
     })
 }
 
-/// Part of a size bin that profiles can tell about, all categories together.
+/// Part of a size bin above the threshold, all categories together.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
     index: usize,
@@ -162,14 +165,15 @@ struct Bin {
 }
 
 impl Bin {
-    /// Number density times the mean of D³ over the bin: the volume of its particles per unit volume, for bodies of volume 1 at size 1.
+    /// Volume of the particles of the bin per unit volume, for bodies of volume 1 at size 1: number density times the
+    /// mean of D³ over the bin.
     fn volume(&self) -> f64 {
         let mean_cube = 0.25 * (self.upper + self.lower) * (self.upper.powi(2) + self.lower.powi(2));
         self.number_density * mean_cube
     }
 }
 
-/// The bins from the threshold on; of the bin it falls in, the part above it.
+/// The bins above the threshold; of the bin that contains it, the part above.
 fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
     let all = &densities.all;
     let bin = |index: usize| {
@@ -184,7 +188,7 @@ fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
             });
         }
         let seen = lower.max(all.threshold.min(upper));
-        // The densities of that bin are of the particles above the threshold only.
+        // The density of that bin counts only the particles above the threshold.
         (seen < upper).then_some(Bin {
             index,
             lower: seen,
@@ -209,7 +213,7 @@ fn side(
         Extent::Count(count) => holding(count as f64),
     };
     let periods = match extent {
-        // Not smaller than it must be.
+        // Never smaller than required.
         Extent::Auto => (asked / texture_period).ceil(),
         _ => (asked / texture_period).round(),
     }
@@ -235,7 +239,7 @@ fn side(
     Ok(side)
 }
 
-/// The largest particles up to the most that are packed.
+/// The largest particles, up to the maximum number that is packed.
 fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, findings: &mut Vec<Finding>) -> Vec<Bin> {
     let per_count = density_factor * volume;
     let expected: f64 = bins.iter().map(|bin| bin.number_density * per_count).sum();
@@ -253,7 +257,7 @@ fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, findings: &mut
             smallest = bin.lower;
             continue;
         }
-        // The upper part of this bin: its sizes are spread evenly.
+        // The upper part of this bin, as its sizes are spread evenly.
         let share = room / count;
         let lower = bin.upper - share * (bin.upper - bin.lower);
         if share > 0.0 {
@@ -271,14 +275,14 @@ fn keep_largest(bins: Vec<Bin>, density_factor: f64, volume: f64, findings: &mut
     findings.push(Finding::new(
         "fines-left-out",
         format!(
-            "the box would hold {expected:.0} particles; those below size {smallest:.4} ({:.1} % of the particles' volume) were left out. Take a smaller --box to keep them",
+            "the box would hold {expected:.0} particles; those below size {smallest:.4} ({:.1} % of the particles' volume) were left out. Use a smaller box to keep them",
             100.0 * lost
         ),
     ));
     kept
 }
 
-/// Whole particles of every type and category, largest last.
+/// Whole numbers of particles of every type and category, in order of size.
 fn draw(
     bins: &[Bin],
     densities: &ParticleDensities,

@@ -1,14 +1,13 @@
-//! Is the fine detail of the solid as coarse or fine as the photograph's? Their power spectra.
+//! Power spectra of the fine detail: whether that of the solid is as coarse as that of the photograph.
 
-#![allow(clippy::cast_possible_truncation, reason = "pictures are at most 512 pixels wide")]
-
+use crate::pipeline::narrowing::pixels_between;
 use image::RgbImage;
 use ndarray::Array2;
 use stereology_segment::Segmentation;
 use stereology_spectrum::{RadialSpectrum, SpectrumError, periodic_component, radial_spectrum};
 use stereology_volume::{Axis, SlicePlane, Solid, SolidError};
 
-/// Power spectra of the residual, over all directions in the plane.
+/// Radial power spectra of the residual.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualSpectra {
     /// Cycles per pixel, up to one half.
@@ -20,7 +19,8 @@ pub struct ResidualSpectra {
 }
 
 impl ResidualSpectra {
-    /// Root mean square of log10 of the ratio of the powers, each frequency weighted by its part of the photograph's variance: 0.3 is a factor of two.
+    /// Root mean square of log10 of the ratio of the powers, each frequency weighted by its part of the photograph's
+    /// variance: 0.3 is a factor of two.
     #[must_use]
     pub fn log_error(&self) -> f64 {
         let mut sums = [0.0; 2];
@@ -53,20 +53,20 @@ impl ResidualSpectra {
     }
 }
 
-/// Spectra that cannot be had.
+/// Why there are no spectra.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpectraError {
-    /// A field too small.
+    /// A field that is too small.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
     /// A section that cannot be drawn.
     #[error(transparent)]
     Solid(#[from] SolidError),
     /// Particles and gaps are too narrow to show a texture.
-    #[error("only {:.1} % of a picture lie away from the outlines of profiles: too little for a spectrum", 100.0 * .share)]
+    #[error("only {:.1} % of an image lie away from the outlines of profiles: too little for a spectrum", 100.0 * .share)]
     AllOutline {
-        /// Share of the picture away from outlines.
+        /// Fraction of the image away from outlines.
         share: f64,
     },
 }
@@ -74,25 +74,28 @@ pub enum SpectraError {
 const RADIAL_BINS: usize = 32;
 /// The weights of red, green and blue in luminance.
 const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
-/// Sections are at most so many pixels wide.
+/// Largest width of a section in pixels.
 const MOST_PIXELS: f64 = 512.0;
 
-/// Pixels nearer than this to an outline are left out: a photograph blurs outlines, which is no texture.
+/// Pixels nearer than this to an outline are left out: blurred outlines of a photograph are not texture.
 const OUTLINE: usize = 3;
-/// Of smaller shares of a picture nothing can be told.
+/// Smallest fraction of an image that gives a spectrum.
 const LEAST_SHARE: f64 = 0.02;
 
-/// Radial power spectra of the photograph's residual and of that of three sections of the solid, both away from the outlines of profiles.
+/// Radial power spectra of the residual of the photograph and of three sections of the solid, both away from the
+/// outlines of profiles.
 ///
-/// Left-out pixels count as zero and the power is divided by the share of the others, in photograph and sections alike.
+/// Pixels near outlines are set to zero, and the power is divided by the fraction of the others, in photograph and
+/// sections alike.
 ///
 /// # Errors
 ///
-/// [`SpectraError`] for pictures too small to have a spectrum, or all outline.
+/// [`SpectraError`]: images that are too small, or with outlines nearly everywhere.
 ///
 /// # Examples
 ///
-/// A plain sphere in a binder with a fine ripple: the ripple of the sections is that of the photograph, itself a section.
+/// A plain sphere in a binder with a fine ripple. The photograph is itself a section, so both spectra have the same
+/// peak.
 ///
 /// ```
 /// use stereology::pipeline::residual_spectra;
@@ -128,12 +131,12 @@ pub fn residual_spectra(
             .sum::<f64>()
     });
     let photo = inner_spectrum(photo, &segmentation.labels)?;
-    let plain = solid.without_residual().with_border_samples(1);
-    let detailed = solid.clone().with_border_samples(1);
+    let plain = solid.without_residual().with_border_samples(1)?;
+    let detailed = solid.clone().with_border_samples(1)?;
     let mut sections = vec![0.0; RADIAL_BINS];
     for axis in [Axis::X, Axis::Y, Axis::Z] {
         let side = solid.period().sides()[axis.index()];
-        let pixels = (solid.period().sides().min() / pixel).round().clamp(16.0, MOST_PIXELS) as u32;
+        let pixels = pixels_between(solid.period().sides().min() / pixel, 16.0, MOST_PIXELS);
         let plane = SlicePlane::across(axis, 0.3 * side);
         let drawn = difference(
             &detailed.slice(&plane, pixels, pixels, pixel)?,
@@ -144,7 +147,7 @@ pub fn residual_spectra(
             *sum += power / 3.0;
         }
     }
-    // Beyond Nyquist there are only the corners of the square of frequencies.
+    // Beyond the Nyquist frequency only the corners of the square of frequencies remain.
     let upto = |values: Vec<f64>| values.into_iter().take(RADIAL_BINS).collect();
     Ok(ResidualSpectra {
         frequency: upto(photo.frequency),
@@ -174,9 +177,9 @@ fn inner_spectrum(mut field: Array2<f64>, labels: &Array2<u32>) -> Result<Radial
     Ok(spectrum)
 }
 
-/// Pixels whose neighbours up to [`OUTLINE`] rows and columns away all carry their label.
+/// Pixels whose neighbours up to [`OUTLINE`] rows and columns away all have the same label.
 fn far_from_outlines(labels: &Array2<u32>) -> Array2<bool> {
-    // Along rows, then along columns: a square is the one after the other.
+    // Along rows, then along columns: together a square.
     let like_neighbours = |inner: &Array2<bool>, along: Axis2| {
         Array2::from_shape_fn(labels.dim(), |(y, x)| {
             let (place, length) = match along {
@@ -204,12 +207,14 @@ enum Axis2 {
 
 /// Luminance of `a` less that of `b`, encoded values / 255.
 fn difference(a: &RgbImage, b: &RgbImage) -> Array2<f64> {
-    Array2::from_shape_fn((a.height() as usize, a.width() as usize), |(y, x)| {
-        let (p, q) = (a.get_pixel(x as u32, y as u32).0, b.get_pixel(x as u32, y as u32).0);
+    let (height, width) = (a.height() as usize, a.width() as usize);
+    let of = |p: &image::Rgb<u8>, q: &image::Rgb<u8>| -> f64 {
         (0..3)
-            .map(|channel| LUMINANCE[channel] * (f64::from(p[channel]) - f64::from(q[channel])) / 255.0)
+            .map(|channel| LUMINANCE[channel] * (f64::from(p.0[channel]) - f64::from(q.0[channel])) / 255.0)
             .sum()
-    })
+    };
+    let values: Vec<f64> = a.pixels().zip(b.pixels()).map(|(p, q)| of(p, q)).collect();
+    Array2::from_shape_fn((height, width), |(y, x)| values[y * width + x])
 }
 
 #[cfg(test)]
@@ -223,7 +228,8 @@ mod tests {
         let inner = far_from_outlines(&labels);
         for ((y, x), &inner) in inner.indexed_iter() {
             let near = |place: usize, edge: usize| place + OUTLINE >= edge && place < edge + OUTLINE;
-            // Near the edge of the marked quarter, which goes on along the lines y = 10 (x >= 20) and x = 20 (y >= 10).
+            // Near the edge of the marked quarter, which continues along the lines y = 10 (x >= 20) and x = 20 (y >=
+            // 10).
             let touched = (near(y, 10) && x + OUTLINE >= 20) || (near(x, 20) && y + OUTLINE >= 10);
             assert_eq!(inner, !touched, "{y} {x}");
         }

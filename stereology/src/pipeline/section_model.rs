@@ -1,4 +1,5 @@
-//! Parameters of the kernel: the largest size, the capping angle, the fractions of the particle types; each given, or estimated from the profiles.
+//! Parameters of the kernel: the largest size, the capping angle, the fractions of the particle types; each given, or
+//! estimated from the profiles.
 
 use crate::pipeline::{Capping, DensityError, LargestSize, MeasuredProfiles, ParticleTypes, UnfoldingBins};
 use stereology_kmatrix::Sizes;
@@ -9,7 +10,8 @@ use stereology_unfold::{
 
 /// Nominal coverage of the intervals of parameters of highest likelihood.
 const LEVEL: f64 = 0.9;
-/// Upper end of the search for the capping angle, in radians: at this angle profiles narrower than 98.5 % of the particle are lost.
+/// Upper end of the search for the capping angle, in radians: at this angle profiles narrower than 98.5 % of the
+/// particle are lost.
 const STEEPEST: f64 = 1.4;
 /// Upper end of the search for the largest size, in sizes of the largest profile.
 const BEYOND: f64 = 1.5;
@@ -48,8 +50,8 @@ impl Counted {
 pub struct LargestParticle {
     /// The size.
     pub size: f64,
-    /// How it was found. It differs from the request in one case: [`LargestSize::Corrected`] becomes [`LargestSize::Profile`] if the largest profiles are
-    /// all of one size, or if there is only one.
+    /// How it was found. It differs from the request in one case: [`LargestSize::Corrected`] becomes
+    /// [`LargestSize::Profile`] if the largest profiles are all of one size, or if there is only one.
     pub method: LargestSize,
     /// The search, for [`LargestSize::Likelihood`].
     pub likelihood: Option<LikelyParameter>,
@@ -64,7 +66,7 @@ pub struct LargestParticle {
 /// ```
 /// use stereology::pipeline::{LargestSize, MeasuredProfiles, ParticleTypes, largest_particle};
 /// use stereology::unfold::UnfoldOptions;
-/// // Spheres of diameter 10, cut at even depths.
+/// // Spheres of diameter 10, sectioned at even depths.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let mut profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let types = ParticleTypes::parse(&["sphere"])?;
@@ -175,7 +177,7 @@ impl ParticleTypes {
 /// ```
 /// use stereology::pipeline::{Capping, MeasuredProfiles, ParticleTypes, capping_angle};
 /// use stereology::unfold::UnfoldOptions;
-/// // Spheres of diameter 10, cut at even depths.
+/// // Spheres of diameter 10, sectioned at even depths.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let types = ParticleTypes::parse(&["sphere"])?;
@@ -213,16 +215,18 @@ pub fn capping_angle(
     }
 }
 
-/// Fractions of the particle types of highest likelihood, where the types of the profiles are not known; for bins between `edges`.
+/// Fractions of the particle types of highest likelihood, where the types of the profiles are not known; for bins
+/// between `edges`.
 ///
 /// # Errors
 ///
-/// [`DensityError`]: a single type, no counted profile, or as [`unknown_fractions`]: often the profiles do not determine the fractions.
+/// [`DensityError`]: a single type, no counted profile, or as [`unknown_fractions`]: often the profiles do not
+/// determine the fractions.
 ///
 /// ```
 /// use stereology::pipeline::{MeasuredProfiles, ParticleTypes, type_fractions};
 /// use stereology::unfold::UnfoldOptions;
-/// // Spheres of diameter 10, cut at even depths.
+/// // Spheres of diameter 10, sectioned at even depths.
 /// let sizes: Vec<f64> = (0..300).map(|i| 10.0 * (1.0 - ((f64::from(i) + 0.5) / 300.0).powi(2)).sqrt()).collect();
 /// let profiles = MeasuredProfiles { weights: vec![1.0; 300], categories: vec![0; 300], area: 1e5, sizes, ..MeasuredProfiles::default() };
 /// let types = ParticleTypes::parse(&["sphere", "ellipsoid:1,1,1.1"])?;

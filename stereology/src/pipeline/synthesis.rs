@@ -1,8 +1,7 @@
-//! The whole chain: a photograph in, a solid out, and what tells whether to trust it.
-
-#![allow(clippy::cast_possible_truncation, reason = "colours are f32 in a solid")]
+//! The whole chain: from a photograph to a solid, with a verdict on whether to trust it.
 
 use crate::pipeline::colouring::particle_colours;
+use crate::pipeline::narrowing::single;
 use crate::pipeline::{
     DensityError, DensityOptions, Evidence, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes,
     Population, PopulationFailure, Recipe, ResidualSpectra, Verdict, Verification, VerificationError, fine_details,
@@ -22,20 +21,20 @@ use stereology_volume::{Solid, SolidError};
 /// A step of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
-    /// Finding profiles.
+    /// Segmentation of the photograph.
     Segment,
-    /// Densities from profiles.
+    /// Unfolding of the profiles.
     Unfold,
-    /// Particles in a box.
+    /// Packing of the particles.
     Pack,
-    /// The residual volume.
+    /// Synthesis of the residual volume.
     Texture,
-    /// Sections of the solid.
+    /// Comparison of sections of the solid with the photograph.
     Verify,
 }
 
 impl Step {
-    /// Its name in reports.
+    /// Name of the step in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -48,16 +47,16 @@ impl Step {
     }
 }
 
-/// How to make a solid.
+/// Options of [`synthesize`].
 #[derive(Clone, Debug)]
 pub struct SynthesisOptions {
     /// Size of a pixel: the unit of all lengths below and of the results.
     pub pixel: f64,
-    /// Finding profiles; areas in pixels.
+    /// Segmentation; areas in pixels.
     pub segment: SegmentOptions,
     /// Unfolding.
     pub densities: DensityOptions,
-    /// How large the solid is.
+    /// Size of the solid.
     pub extent: Extent,
     /// Volume fraction of particles; by default the photograph's area fraction.
     pub fraction: Option<f64>,
@@ -67,14 +66,14 @@ pub struct SynthesisOptions {
     pub pack: PackOptions,
     /// The residual volume.
     pub texture: TextureOptions,
-    /// Voxels of its side, each as large as a pixel.
+    /// Side of the residual volume in voxels, each as large as a pixel.
     pub texture_voxels: usize,
-    /// Same seed, same bits.
+    /// Seed: the same seed gives the same bits.
     pub seed: u64,
 }
 
 impl Default for SynthesisOptions {
-    /// Lengths in pixels, a texture of 128³ voxels, everything else as its step has it.
+    /// Lengths in pixels, a residual volume of 128³ voxels, and the defaults of every step.
     fn default() -> Self {
         Self {
             pixel: 1.0,
@@ -91,24 +90,24 @@ impl Default for SynthesisOptions {
     }
 }
 
-/// A solid, and everything that was found on the way.
+/// A solid, and the results of all steps.
 #[derive(Clone, Debug)]
 pub struct Synthesis {
     /// The profiles of the photograph.
     pub segmentation: Segmentation,
-    /// What was unfolded, in the unit of length.
+    /// The same profiles in the unit of length, as they were unfolded.
     pub profiles: MeasuredProfiles,
     /// Particles per volume.
     pub densities: ParticleDensities,
-    /// Which particles were packed, and why so many.
+    /// The particles that were packed, and their number.
     pub population: Population,
-    /// Their packing, certified.
+    /// Their packing, with its certificate.
     pub packing: Packing,
-    /// The residual.
+    /// The residual volumes.
     pub details: FineDetails,
     /// The solid.
     pub solid: Solid,
-    /// Its sections beside the photograph.
+    /// Its sections, compared with the photograph.
     pub verification: Verification,
     /// Power spectra of the residual in photograph and sections; `None` if either is too small or all outlines.
     pub spectra: Option<ResidualSpectra>,
@@ -118,41 +117,41 @@ pub struct Synthesis {
     pub findings: Vec<Finding>,
 }
 
-/// A solid that could not be made.
+/// Why a solid could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SynthesisError {
-    /// Finding profiles.
+    /// Segmentation.
     #[error(transparent)]
     Segment(#[from] SegmentError),
-    /// Unfolding them.
+    /// Unfolding.
     #[error(transparent)]
     Densities(#[from] DensityError),
-    /// Choosing particles.
+    /// Population of the box.
     #[error(transparent)]
     Population(#[from] PopulationFailure),
-    /// Arranging them.
+    /// Arrangement of the particles.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
-    /// Packing them.
+    /// Packing.
     #[error(transparent)]
     Pack(#[from] PackError),
-    /// The residual volume.
+    /// Residual volume.
     #[error(transparent)]
     Texture(#[from] TextureError),
-    /// Putting the solid together.
+    /// Assembly of the solid.
     #[error(transparent)]
     Solid(#[from] SolidError),
-    /// Comparing it with the photograph.
+    /// Comparison with the photograph.
     #[error(transparent)]
     Verification(#[from] VerificationError),
-    /// A pixel must have a size.
+    /// An invalid size of a pixel.
     #[error("the size of a pixel is {0}: it must be positive and finite")]
     Pixel(f64),
 }
 
 impl SynthesisError {
-    /// Did the caller break off?
+    /// Whether the caller cancelled.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         matches!(
@@ -166,13 +165,14 @@ impl SynthesisError {
     }
 }
 
-/// Makes the solid of a photograph, with its profiles segmented or taken from a label map (y, x).
+/// Makes the solid of a photograph. Its profiles are segmented, or taken from a label map (y, x).
 ///
-/// `progress` is told the step and how far it is, and may break off. Memory: some hundred bytes a pixel and a voxel of the texture.
+/// `progress` receives the step and the completed fraction of it, and may cancel. Memory: some hundred bytes per pixel
+/// and per voxel of the residual volume.
 ///
 /// # Errors
 ///
-/// [`SynthesisError`]: the step that failed, and why.
+/// [`SynthesisError`] of the step that failed.
 ///
 /// # Examples
 ///
@@ -182,7 +182,7 @@ impl SynthesisError {
 /// use std::ops::ControlFlow;
 /// use stereology::pipeline::{Extent, ParticleTypes, SynthesisOptions, synthesize};
 ///
-/// // A picture of 25 brick discs in a pale binder.
+/// // A synthetic test image of 25 brick discs in a pale binder.
 /// let disc = |x: u32, y: u32| (x % 40).abs_diff(20).pow(2) + (y % 40).abs_diff(20).pow(2) < (6 + (x / 40 + y / 40)).pow(2);
 /// let photo = RgbImage::from_fn(200, 200, |x, y| if disc(x, y) { Rgb([170, 70, 50]) } else { Rgb([225, 220, 210]) });
 /// let labels = Array2::from_shape_fn((200, 200), |(y, x)| if disc(x as u32, y as u32) { (1 + x / 40 + 5 * (y / 40)) as u32 } else { 0 });
@@ -248,7 +248,7 @@ pub fn synthesize(
     let solid = Solid::new(
         packing.arrangement().clone(),
         particle_colours(&packing, &segmentation.profiles, options.pixel, options.seed),
-        segmentation.binder.colour.map(|c| c as f32),
+        segmentation.binder.colour.map(single),
         Some(details.residual.clone()),
     )?
     .with_voids(&options.voids)?;
@@ -307,7 +307,7 @@ fn mean_size(packing: &Packing) -> f64 {
 /// use stereology::pipeline::measured_profiles;
 /// use stereology::segment::{SegmentOptions, Segmentation};
 ///
-/// // A disc of diameter 40 pixels, on a picture of .1 mm a pixel.
+/// // A disc of diameter 40 pixels, at .1 mm per pixel.
 /// let disc = |x: usize, y: usize| x.abs_diff(50).pow(2) + y.abs_diff(50).pow(2) <= 20 * 20;
 /// let photo = RgbImage::from_fn(100, 100, |x, y| Rgb(if disc(x as usize, y as usize) { [170, 70, 50] } else { [225, 220, 210] }));
 /// let labels = Array2::from_shape_fn((100, 100), |(y, x)| u32::from(disc(x, y)));
@@ -325,7 +325,7 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         slices: Vec::new(),
         types: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
-        // A profile of exactly the least area was kept: the threshold lies just below it.
+        // Profiles of exactly the smallest area are kept, so the threshold lies just below it.
         min_size: segmentation.min_size * pixel * (1.0 - 1e-9),
     }
 }

@@ -4,8 +4,9 @@ use crate::pipeline::ParticleTypes;
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{Method, divided_edges, fitting_edges, fitting_profile_edges};
 
-/// The bins of a fit: profile bins fine enough that hardly anything of the profiles is lost, size bins fine enough for a smooth density, both with an edge
-/// at the threshold. The paper's inverse needs a square kernel, the particles' own bins; sizes all at their bins' upper edges have no finer ones.
+/// The bins of a fit: profile bins fine enough to lose little information, size bins fine enough for a smooth density,
+/// both with an edge at the threshold. The paper's inverse needs a square kernel, so its bins are the reported ones; so
+/// are the size bins where all sizes are at the upper edges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnfoldingBins {
     /// Edges of the profile bins.
@@ -14,9 +15,9 @@ pub struct UnfoldingBins {
     pub size_edges: Vec<f64>,
 }
 
-/// A hundred profile bins or more lose nothing that shows in the densities.
+/// With a hundred profile bins or more the loss of information does not show in the densities.
 const PROFILE_BINS: usize = 100;
-/// Forty size bins or more make the smooth estimate as smooth as can be seen.
+/// With forty size bins or more the steps of a smooth estimate are not visible.
 const SIZE_BINS: usize = 40;
 
 impl UnfoldingBins {
@@ -44,8 +45,8 @@ impl UnfoldingBins {
         }
     }
 
-    /// [`new`](Self::new) with bins from which grids of linear, root and logarithmic spacing can be made, the last from `smallest` on: the size of the
-    /// smallest profile.
+    /// [`new`](Self::new) with bins from which grids of linear, root and logarithmic spacing can be made, the last from
+    /// `smallest` on: the size of the smallest profile.
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
@@ -65,12 +66,13 @@ impl UnfoldingBins {
     }
 }
 
-/// The highest profile bin is widened until it holds this share of the profiles of the largest particles. A body's largest section may hardly ever be met (for
-/// a mesh: never, by any plane that was tried), and a profile there would not be explained, or count for far too many particles.
+/// The highest profile bin is widened until it holds this fraction of the profiles of the largest particles. Planes
+/// rarely give the largest section of a body (of a mesh, possibly none of the planes tried), so a profile there could
+/// not be explained, or would count for far too many particles.
 const TOP_SHARE: f64 = 0.01;
 
 impl ParticleTypes {
-    /// [`UnfoldingBins::for_profiles`] with the highest profile bin so wide that every type shows profiles in it.
+    /// [`UnfoldingBins::for_profiles`] with the highest profile bin wide enough that every type has profiles in it.
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
@@ -80,7 +82,7 @@ impl ParticleTypes {
     ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
     /// };
     /// assert_eq!(top("sphere")?, 0.99);
-    /// assert!(top("box:1,1,2")? < 0.99); // hardly ever cut through two opposite edges
+    /// assert!(top("box:1,1,2")? < 0.99); // rarely cut through two opposite edges
     /// # Ok::<(), stereology::pipeline::ParticleTypesError>(())
     /// ```
     #[must_use]

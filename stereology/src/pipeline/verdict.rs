@@ -29,7 +29,8 @@ pub enum CheckName {
     GoodnessOfFit,
     /// Relative difference between the unfolded volume fraction and the area fraction of the photograph.
     VolumeFraction,
-    /// Largest penetration of two particles, in mean sizes; below zero: the smallest gap; -∞ if no two bounding spheres meet.
+    /// Largest penetration of two particles, in mean sizes; below zero: the smallest gap; -∞ if no two bounding spheres
+    /// meet.
     Overlap,
     /// Relative difference between the area fractions of the solid's sections and of the photograph.
     SectionAreaFraction,
@@ -149,14 +150,15 @@ pub struct Evidence {
     pub volume_fraction: f64,
     /// Area fraction of the photograph.
     pub area_fraction: f64,
-    /// Smallest gap between two particles whose bounding spheres meet, in mean particle sizes ([`Certificate`](stereology_anneal::Certificate)); infinite if
-    /// there are none, below zero if particles overlap.
+    /// Smallest gap between two particles whose bounding spheres meet, in mean particle sizes
+    /// ([`Certificate`](stereology_anneal::Certificate)); infinite if there are none, below zero if particles overlap.
     pub smallest_gap: f64,
     /// Exact sections of the solid, compared with the photograph.
     pub exact: Comparison,
     /// Drawn sections segmented like the photograph.
     pub resegmented: Option<Comparison>,
-    /// Error of the power spectrum of the residual ([`ResidualSpectra::log_error`](crate::pipeline::ResidualSpectra::log_error)).
+    /// Error of the power spectrum of the residual
+    /// ([`ResidualSpectra::log_error`](crate::pipeline::ResidualSpectra::log_error)).
     pub texture_error: Option<f64>,
 }
 
@@ -167,7 +169,8 @@ struct Limits {
     care: f64,
 }
 
-/// Warnings of the segmentation after which the outlines need a look: some profiles may be missed, merged or clipped, most are not.
+/// Warnings of the segmentation after which the outlines need a look: some profiles may be missed, merged or clipped,
+/// most are not.
 const DOUBTFUL: [&str; 5] = [
     "unstable-count",
     "edge-heavy",
@@ -178,38 +181,43 @@ const DOUBTFUL: [&str; 5] = [
 /// Without a binder colour the choice between particles and binder is a guess, and every figure depends on it.
 const GUESSED: &str = "no-binder";
 
-/// The relative standard error of a count is at least 1 / √n: 6 % at 250 profiles, 14 % at 50. With ten bins, 250 profiles are 25 per bin and 50 are five,
-/// the fewest for which the deviance means anything.
+/// The relative standard error of a count is at least 1 / √n: 6 % at 250 profiles, 14 % at 50. With ten bins, 250
+/// profiles are 25 per bin and 50 are five, the fewest for which the deviance means anything.
 const PROFILES: Limits = Limits {
     good: 250.0,
     care: 50.0,
 };
-/// The deviance of a correct model is χ², with as many degrees of freedom as the fit has (`Unfolding::degrees_of_freedom`) and a standard deviation of the root
-/// of twice their number. With 7 to 40 of them a correct model exceeds 3 standard deviations about once in 100 to 200 times and 6 less than once in 5,000.
+/// The deviance of a correct model is χ², with as many degrees of freedom as the fit has
+/// (`Unfolding::degrees_of_freedom`) and a standard deviation of the root of twice their number. With 7 to 40 of them a
+/// correct model exceeds 3 standard deviations about once in 100 to 200 times and 6 less than once in 5,000.
 const DEVIATIONS: Limits = Limits { good: 3.0, care: 6.0 };
-/// Delesse: both fractions have one expectation, whatever the shapes. The area fraction of some hundred profiles has a standard error of 5 to 10 %, so that a
-/// larger difference means a wrong shape or missed profiles. At 25 % sizes would have to be wrong by 8 % (cube root) to explain it. Same limit as the
-/// warning `fraction-mismatch`.
+/// Delesse: both fractions have one expectation, whatever the shapes. The area fraction of some hundred profiles has a
+/// standard error of 5 to 10 %, so that a larger difference means a wrong shape or missed profiles. At 25 % sizes would
+/// have to be wrong by 8 % (cube root) to explain it. Same limit as the warning `fraction-mismatch`.
 const VOLUME_FRACTION: Limits = Limits { good: 0.10, care: 0.25 };
-/// The certificate allows 10⁻¹² of a size for the rounding of coordinates. A thousand times that is still rounding; 10⁻⁶ of a size is far below a voxel, but
-/// more than rounding can do.
+/// The certificate allows 10⁻¹² of a size for the rounding of coordinates. A thousand times that is still rounding;
+/// 10⁻⁶ of a size is far below a voxel, but more than rounding can do.
 const PENETRATION: Limits = Limits { good: 1e-9, care: 1e-6 };
-/// Exact sections at 96 depths: their area fraction has a standard error of 1 to 2 % about the volume fraction of the packing, which is the photograph's. Beyond
-/// 5 % the packing has lost or gained particles; beyond 10 % it exceeds the error of the photograph's own area fraction.
+/// Exact sections at 96 depths: their area fraction has a standard error of 1 to 2 % about the volume fraction of the
+/// packing, which is the photograph's. Beyond 5 % the packing has lost or gained particles; beyond 10 % it exceeds the
+/// error of the photograph's own area fraction.
 const AREA_FRACTION: Limits = Limits { good: 0.05, care: 0.10 };
-/// Two samples of one distribution with 250 profiles are 3 to 5 % of the mean apart, and sizes are spread over bins of about a tenth of the mean, so 10 % is
-/// within noise and bins. 20 % is a shift of one bin or more, visible in the histograms.
+/// Two samples of one distribution with 250 profiles are 3 to 5 % of the mean apart, and sizes are spread over bins of
+/// about a tenth of the mean, so 10 % is within noise and bins. 20 % is a shift of one bin or more, visible in the
+/// histograms.
 const SIZES: Limits = Limits { good: 0.10, care: 0.20 };
 /// 3 % of the range is 8 of 255 levels, hardly visible side by side; 6 % is 15 levels, a visible change of colour.
 const COLOURS: Limits = Limits { good: 0.03, care: 0.06 };
-/// A width of half the value is about ± 25 %, usual for some hundred profiles. At a width of the value itself, the ends differ by a factor of three.
+/// A width of half the value is about ± 25 %, usual for some hundred profiles. At a width of the value itself, the ends
+/// differ by a factor of three.
 const INTERVAL: Limits = Limits { good: 0.5, care: 1.0 };
-/// Drawn sections and photograph both carry the errors of the segmentation, which doubles the limits of the exact sections; 35 % is more than it adds on
-/// photographs whose outlines are right.
+/// Drawn sections and photograph both carry the errors of the segmentation, which doubles the limits of the exact
+/// sections; 35 % is more than it adds on photographs whose outlines are right.
 const RESEGMENTED_SIZES: Limits = Limits { good: 0.20, care: 0.35 };
 /// Twice the limits of exact sections, as for sizes.
 const RESEGMENTED_AREA_FRACTION: Limits = Limits { good: 0.10, care: 0.20 };
-/// log10 of a factor of 1.5 and of 2.5 in power, 1.2 and 1.6 in contrast: the first is hardly visible side by side, the second is a coarser or finer texture.
+/// log10 of a factor of 1.5 and of 2.5 in power, 1.2 and 1.6 in contrast: the first is hardly visible side by side, the
+/// second is a coarser or finer texture.
 const TEXTURE: Limits = Limits {
     good: 0.176_091,
     care: 0.397_940,

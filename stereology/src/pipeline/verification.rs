@@ -1,10 +1,9 @@
-//! The loop closed: sections of the finished solid measured like the photograph.
-
-#![allow(clippy::cast_possible_truncation, reason = "pictures are at most 1024 pixels wide")]
+//! Sections of the finished solid, measured like the photograph.
 
 use stereology_metrics::{Progress, wasserstein};
 
 use crate::pipeline::MeasuredProfiles;
+use crate::pipeline::narrowing::{count_between, pixels_between};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -12,74 +11,77 @@ use stereology_imaging::connected_components;
 use stereology_segment::{SegmentError, SegmentOptions, Segmentation, segment};
 use stereology_volume::{Axis, SlicePlane, Solid, SolidError};
 
-/// Sections of the solid beside the photograph.
+/// Sections of the solid, compared with the photograph.
 #[derive(Clone, Debug)]
 pub struct Verification {
-    /// Sections measured exactly, from the bodies: what unfolding and packing got right.
+    /// Sections measured exactly, from the bodies: a test of unfolding and packing.
     pub exact: Comparison,
-    /// Sections drawn at the photograph's scale and measured by the photograph's recipe: the only test that shows a bias of segmentation. `None` if the
-    /// recipe found no particles on them.
+    /// Sections drawn at the photograph's scale and measured like the photograph: the only test that shows a bias of
+    /// the segmentation. `None` if no particles were found on them.
     pub resegmented: Option<Comparison>,
-    /// Profile sizes of the exact sections, above the photograph's threshold.
+    /// Profile sizes of the exact sections, above the detection limit of the photograph.
     pub section_sizes: Vec<f64>,
     /// Area of the exact sections; length squared.
     pub section_area: f64,
-    /// The sections that were drawn.
+    /// The drawn sections.
     pub pictures: Vec<RgbImage>,
 }
 
-/// How sections compare with the photograph.
+/// Comparison of sections with the photograph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// Profiles counted on the photograph.
     pub profiles_photo: usize,
     /// Profiles counted on the sections.
     pub profiles_synthetic: usize,
-    /// Wasserstein-1 distance of the profile sizes, over their mean on the photograph.
+    /// Wasserstein-1 distance of the profile sizes, divided by their mean on the photograph.
     pub size_w1: f64,
-    /// Share of the photograph inside profiles.
+    /// Area fraction of the profiles on the photograph.
     pub area_fraction_photo: f64,
-    /// Share of the sections inside profiles.
+    /// Area fraction of the profiles on the sections.
     pub area_fraction_synthetic: f64,
-    /// Wasserstein-1 distance of the colours, mean over red, green and blue, encoded values / 255: of mean colours by area in exact sections, of pixels in drawn ones.
+    /// Wasserstein-1 distance of the colours, mean over red, green and blue, encoded values / 255: of mean colours
+    /// weighted by area for exact sections, of pixels for drawn ones.
     pub colour_distance: f64,
 }
 
-/// A verification that could not be done.
+/// Why a verification failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerificationError {
     /// A section could not be drawn.
     #[error(transparent)]
     Solid(#[from] SolidError),
-    /// A section could not be segmented for another reason than having no particles.
+    /// A section that contains particles could not be segmented.
     #[error("a section of the solid could not be segmented: {0}")]
     Segment(#[from] SegmentError),
-    /// The caller broke off.
+    /// The caller cancelled.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Exact sections an axis.
+/// Exact sections per axis.
 const DEPTHS: usize = 32;
-/// Drawn sections: enough for twice the photograph's area, within these.
+/// Limits of the number of drawn sections, which cover twice the area of the photograph.
 const FEWEST_PICTURES: usize = 3;
 const MOST_PICTURES: usize = 6;
-/// Pixels of a side of a drawn section.
+/// Largest side of a drawn section in pixels.
 const LARGEST_PICTURE: f64 = 1024.0;
 
-/// How the photograph's profiles were found, to do the same with sections.
+/// How the profiles of the photograph were found, so that sections are measured in the same way.
 #[derive(Clone, Copy, Debug)]
 pub enum Recipe<'a> {
     /// By segmentation with these options.
     Segmented(&'a SegmentOptions),
-    /// From a label map of another tool; sections then give the labels of their pixels.
+    /// From a label map of another tool; sections then use the particles of their pixels as labels.
     Labelled(&'a SegmentOptions),
 }
 
-/// Sections `solid` at many depths along all axes and compares profile sizes, area fraction and colours with the photograph's.
+/// Sections `solid` at many depths along all axes and compares profile sizes, area fraction and colours with those of
+/// the photograph.
 ///
-/// `pixel` is the size of a pixel of the photograph. Cost: 96 exact sections and some pictures of the solid's period.
+/// `pixel` is the size of a pixel of the photograph. Cost: 96 exact sections and three to six drawn sections of one
+/// period.
 ///
 /// # Errors
 ///
@@ -87,7 +89,7 @@ pub enum Recipe<'a> {
 ///
 /// # Examples
 ///
-/// The photograph is a cut through the middle of the only sphere; cuts at all depths show less of it.
+/// The photograph is a section through the middle of the only sphere; sections at all depths show less of it.
 ///
 /// ```
 /// use std::ops::ControlFlow;
@@ -194,14 +196,14 @@ fn size_w1(photo: &[(f64, f64)], synthetic: &[(f64, f64)]) -> f64 {
     wasserstein(photo, synthetic) / mean
 }
 
-/// Colours with how much each counts, by channel.
+/// Colours and their weights, by channel.
 type Colours = [Vec<(f64, f64)>; 3];
 
 fn colour_distance(a: &Colours, b: &Colours) -> f64 {
     a.iter().zip(b).map(|(a, b)| wasserstein(a, b)).sum::<f64>() / 3.0
 }
 
-/// The mean colours of profiles and binder, by area.
+/// The mean colours of profiles and binder, weighted by area.
 fn mean_colours(photo: &Segmentation) -> Colours {
     std::array::from_fn(|channel| {
         let covered: f64 = photo.profiles.iter().map(|profile| profile.area).sum();
@@ -238,7 +240,7 @@ struct Sections {
     colours: Colours,
 }
 
-/// Equally spaced planes across all three axes; profiles above `min_size`.
+/// Profiles above `min_size` on equally spaced planes perpendicular to each axis.
 fn exact_sections(solid: &Solid, min_size: f64) -> Sections {
     let sides = solid.period().sides();
     let planes: Vec<(Axis, f64)> = [Axis::X, Axis::Y, Axis::Z]
@@ -284,12 +286,12 @@ struct DrawnSection {
 
 fn drawn_sections(solid: &Solid, photo: &Segmentation, pixel: f64) -> Result<Vec<DrawnSection>, SolidError> {
     let sides = solid.period().sides();
-    let pixels = (sides.min() / pixel).round().clamp(16.0, LARGEST_PICTURE) as u32;
-    let enough = (2.0 * photo.labels.len() as f64 / f64::from(pixels).powi(2)).ceil() as usize;
-    (0..enough.clamp(FEWEST_PICTURES, MOST_PICTURES))
+    let pixels = pixels_between(sides.min() / pixel, 16.0, LARGEST_PICTURE);
+    let enough = 2.0 * photo.labels.len() as f64 / f64::from(pixels).powi(2);
+    (0..count_between(enough, FEWEST_PICTURES, MOST_PICTURES))
         .map(|i| {
             let axis = [Axis::X, Axis::Y, Axis::Z][i % 3];
-            // The golden ratio keeps depths apart, however many.
+            // Multiples of the golden ratio are well spread for any number of sections.
             let depth = (0.5 + i as f64 * 0.618_033_988_749_895).fract() * sides[axis.index()];
             let plane = SlicePlane::across(axis, depth);
             Ok(DrawnSection {
@@ -300,7 +302,7 @@ fn drawn_sections(solid: &Solid, photo: &Segmentation, pixel: f64) -> Result<Vec
         .collect()
 }
 
-/// The profiles of a drawn section by the photograph's recipe; `None` if it finds none.
+/// The profiles of a drawn section, found like those of the photograph; `None` if there are none.
 fn measure(
     drawn: &DrawnSection,
     recipe: Recipe<'_>,

@@ -61,7 +61,8 @@ proptest! {
         prop_assert_eq!(xyz::read(at("p.xyz")).unwrap(), (particles, period));
     }
 
-    /// Densities of every type and category come back; the sum over all, which is in the table too, is not read beside its parts.
+    /// Densities of every type and category come back; the sum over all, which is in the table too, is not read beside
+    /// its parts.
     #[test]
     fn densities_come_back_as_they_were(density in prop::collection::vec(prop::option::of(1e-9..1.0_f64), 8), width in 0.01..5.0_f64) {
         let folder = tempfile::tempdir().unwrap();

@@ -68,9 +68,10 @@ fn its_profiles_are_found() {
     assert!(found.findings.is_empty(), "{:?}", found.findings);
 }
 
-/// Three colours, and the binder's. The lens and the pixels mix the binder's colour into a profile along its border: a straight edge between colours a and b,
-/// blurred by a Gaussian of standard deviation σ, moves the mean over a's side by (b − a) σ / √(2π) times its length over the area. The rest is the mean of the
-/// stones' texture, 0.022 strong and smooth over 7 pixels, over some 5·10⁴ pixels: about 80 independent patches, 0.0025; the bound is 4 of them.
+/// Three colours, and the binder's. The lens and the pixels mix the binder's colour into a profile along its border: a
+/// straight edge between colours a and b, blurred by a Gaussian of standard deviation σ, moves the mean over a's side
+/// by (b − a) σ / √(2π) times its length over the area. The rest is the mean of the stones' texture, 0.022 strong and
+/// smooth over 7 pixels, over some 5·10⁴ pixels: about 80 independent patches, 0.0025; the bound is 4 of them.
 #[test]
 fn its_colours_are_found() {
     let (found, truth) = (segmentation(), truth());
@@ -104,7 +105,8 @@ fn its_colours_are_found() {
     );
 }
 
-/// About 500 profiles know the number density to some 6 % (their own Poisson error and that of the spread of sizes); the bound is four times that.
+/// About 500 profiles know the number density to some 6 % (their own Poisson error and that of the spread of sizes);
+/// the bound is four times that.
 #[test]
 fn its_number_density_and_sizes_are_recovered() {
     let (found, truth) = (densities(), truth());
@@ -171,7 +173,8 @@ fn its_large_category_is_told_from_the_small_ones() {
     }
 }
 
-/// The loop closes: sections of the solid, exact and segmented again, look like the photograph; and at any number of threads they are the same.
+/// The loop closes: sections of the solid, exact and segmented again, look like the photograph; and at any number of
+/// threads they are the same.
 #[test]
 fn its_solid_shows_the_photographs_sections() {
     let options = SynthesisOptions {

@@ -14,8 +14,8 @@ use stereology::volume::{Axis, Solid};
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
-    /// Spheres packed, cut, and unfolded give their own number density: N_A = D N_V. With some thousand profiles of a packing, whose counts vary less than
-    /// Poisson's, 15 % is more than five standard errors.
+    /// Spheres packed, cut, and unfolded give their own number density: N_A = D N_V. With some thousand profiles of a
+    /// packing, whose counts vary less than Poisson's, 15 % is more than five standard errors.
     #[test]
     fn packed_spheres_are_counted_from_their_sections(seed in 0_u64..1000, fraction in 0.1..0.45_f64) {
         let types = ParticleTypes::parse(&["sphere"]).unwrap();
@@ -94,7 +94,8 @@ proptest! {
     }
 }
 
-/// The largest section of a mesh is hardly ever met, and still the largest profile, whose size is taken for it, is explained.
+/// The largest section of a mesh is hardly ever met, and still the largest profile, whose size is taken for it, is
+/// explained.
 #[test]
 fn largest_profiles_of_meshes_are_explained() {
     let types = ParticleTypes::parse(&["rock:1", "box:1,1,2"]).unwrap();

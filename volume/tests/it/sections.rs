@@ -98,7 +98,12 @@ fn pictures_share_border_pixels_in_proportion() {
 fn border_samples_can_be_turned_off() {
     let solid = mixture(0);
     let plane = SlicePlane::oblique(Vector3::new(1.0, 2.0, -0.5), 3.0).unwrap();
-    let hard = solid.clone().with_border_samples(1).slice(&plane, 60, 50, 0.1).unwrap();
+    let hard = solid
+        .clone()
+        .with_border_samples(1)
+        .unwrap()
+        .slice(&plane, 60, 50, 0.1)
+        .unwrap();
     let soft = solid.slice(&plane, 60, 50, 0.1).unwrap();
     let ids = solid.slice_ids(&plane, 60, 50, 0.1).unwrap();
     let mut mixed = 0;

@@ -161,7 +161,20 @@ pub fn schema_of<T: Fields>() -> Schema {
     if let Some(definitions) = definitions {
         object.insert("$defs".to_owned(), definitions);
     }
+    join_lines(schema.ensure_object());
     schema
+}
+
+/// Joins the lines of all descriptions, which doc comments break.
+fn join_lines(fields: &mut Map<String, Value>) {
+    for (key, value) in fields {
+        match value {
+            Value::String(text) if key == "description" => *text = text.replace('\n', " "),
+            Value::Object(inner) => join_lines(inner),
+            Value::Array(values) => values.iter_mut().filter_map(Value::as_object_mut).for_each(join_lines),
+            _ => {}
+        }
+    }
 }
 
 /// Properties of every answer: those before a command's own fields, and those behind them.

@@ -199,7 +199,7 @@ fn bad_distributions_and_meshes_are_refused() {
     image::GrayImage::from_pixel(8, 8, image::Luma([255]))
         .save(&white)
         .unwrap();
-    refused("one grey value", &["contact", &white, "-o", &path(&folder, "x.json")]);
+    refused("same grey value", &["contact", &white, "-o", &path(&folder, "x.json")]);
     for wrong in [
         &["displace", &mesh, "-o", &out] as &[&str],
         &["displace", &mesh, "--contact", &contact, "--units", "-1", "-o", &out],

@@ -192,7 +192,7 @@ fn bubbles_are_holes() {
     let (photo, out) = (path(&folder, "discs.png"), path(&folder, "out"));
     write_discs(&photo);
     let (code, _, error) = stereology(&["synthesize", &photo, "-o", &out, "--void", "1"]);
-    assert!(code == 2 && error.contains("counted from 0"), "{code} {error}");
+    assert!(code == 2 && error.contains("numbered from 0"), "{code} {error}");
     answer(&[&["synthesize", &photo, "-o", &out, "--void", "0"], &SMALL[..]].concat());
     let file = |name: &str| path(&folder, name);
     for channel in ["alpha", "category"] {

@@ -1,4 +1,4 @@
-//! What is wrong is told in one message: exit 1 (2 for usage), never a panic, never a half-written file.
+//! Errors are one message with exit code 1 (2 for wrong usage), never a panic or a partial file.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-//! Solids from pictures: what is given stays, what is masked stays empty, phases keep their fractions, mistakes are
-//! told.
+//! Solids from images: fixed voxels keep their values, masked voxels stay empty, phases keep their fractions, and
+//! mistakes are errors.
 
 use std::fs;
 use std::path::Path;

@@ -341,7 +341,7 @@ fn textures_and_their_bands() {
     ]);
     assert_eq!(made["shape"], serde_json::json!([16, 20, 24, 3]));
     assert_eq!(made["slice_errors"].as_array().unwrap().len(), 1);
-    // Matching the colours of so few voxels at the end undoes a part; what is left is told.
+    // Matching the colours of so few voxels at the end undoes a part; the remaining error is reported.
     let errors = [&made["slice_errors"][0], &made["final_error"]].map(|error| error.as_f64().unwrap());
     assert!(
         errors.iter().all(|error| (0.0..1.0).contains(error)) && made["settled"].is_boolean(),

@@ -134,7 +134,7 @@ fn a_small_photograph_becomes_a_solid() {
             assert!(fs::metadata(&file).unwrap().len() >= 16 * 16 * 16 * bytes);
         }
     }
-    // A folder gives way to --force alone, and what was broken off is gone on with.
+    // Only --force replaces a folder, and an interrupted write is resumed.
     let zarr = path(&folder, "rgb.zarr");
     answer(&["export", &out, "--voxels", "16", "--resume", "-o", &zarr]);
     let (code, _, error) = stereology(&["export", &out, "--voxels", "16", "-o", &zarr]);
@@ -177,7 +177,7 @@ fn a_small_photograph_becomes_a_solid() {
     answer(&["export", &out, "--voxels", "24", "-o", &path(&folder, "volume.npy")]);
     assert!(fs::read(path(&folder, "volume.npy")).unwrap() == fs::read(format!("{out}/volume.npy")).unwrap());
 
-    // A broken solid is told of, not read.
+    // A damaged solid is an error.
     fs::write(format!("{out}/texture.npy"), b"short").unwrap();
     let (code, _, error) = stereology(&["slice", &out, "-o", &path(&folder, "z.png")]);
     assert!(

@@ -87,7 +87,7 @@ fn edge_rules_name_the_columns_they_miss() {
     assert_eq!(found["profiles"], 2);
 }
 
-/// Two categories of one distribution: each is told, and their sum, though size and colour do not go together;
+/// Two categories of one distribution: each and their sum are reported, although size and colour are independent;
 /// densities.csv holds their rows.
 #[test]
 fn categories_are_unfolded_each_and_together() {

@@ -40,7 +40,8 @@ pub struct UnfoldingFields {
     deviance: f64,
     /// Degrees of freedom of the deviance.
     degrees_of_freedom: usize,
-    /// Goodness of fit: probability of counts at least as far from the expected ones, if the model is right; null without a degree of freedom.
+    /// Goodness of fit: probability of counts at least as far from the expected ones, if the model is right; null
+    /// without a degree of freedom.
     p_value: Option<f64>,
     /// Condition number of the kernel.
     condition_number: f64,

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         })
         .collect();
 
-    // The share of a sphere's profiles below x diameters is 1 - sqrt(1 - x²).
+    // The fraction of a sphere's profiles below x diameters is 1 - sqrt(1 - x²).
     let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
     let edges = equal_edges(1.0, 10);
     let (fine, profile_edges) = (divided_edges(&edges, 40, 0.0), divided_edges(&edges, 100, 0.0));

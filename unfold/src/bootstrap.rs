@@ -1,5 +1,5 @@
-//! Counts drawn again from a fit, or slices drawn again from those there are, fitted again side by side, each from its
-//! own stream of random numbers.
+//! Bootstrap: counts resampled from a fit, or slices resampled with replacement, fitted again in parallel, each from
+//! its own stream of random numbers.
 
 use crate::estimate::Interval;
 use crate::options::{Bootstrap, Resampling};

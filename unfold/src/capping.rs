@@ -13,14 +13,14 @@ use nalgebra::DMatrix;
 
 /// The kernel of a body from its law of relative profile sizes, seen under a capping angle (0: everything is seen).
 ///
-/// `law` is F, the share of the profiles of a particle of size 1 that are no larger than x, rising from 0 to 1 on [0,
-/// 1]; `caliper` the expected number of its profiles per unit area of plane when there is one particle per unit volume:
-/// for a convex body its mean caliper diameter. `capping_angle` is in radians, from 0 to below π/2. Takes 24
+/// `law` is F, the fraction of the profiles of a particle of size 1 that are no larger than x, rising from 0 to 1 on
+/// [0, 1]; `caliper` the expected number of its profiles per unit area of plane when there is one particle per unit
+/// volume: for a convex body its mean caliper diameter. `capping_angle` is in radians, from 0 to below π/2. Takes 24
 /// evaluations of F an entry for sizes spread over their bins.
 ///
 /// # Errors
 ///
-/// [`KernelError::CappingAngle`] for an angle that is none, otherwise as [`Kernel::new`].
+/// [`KernelError::CappingAngle`] for an invalid angle, otherwise as [`Kernel::new`].
 ///
 /// # References
 ///
@@ -33,7 +33,7 @@ use nalgebra::DMatrix;
 /// let edges = equal_edges(1.0, 4);
 /// let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
 /// let kernel = capped_kernel(&law, 1.0, 0.5, &edges, SizeBins::upper_edge(&edges)?, std::f64::consts::PI / 6.0)?;
-/// // Of a sphere's profiles the share cos φ is seen.
+/// // The fraction cos φ of a sphere's profiles is observed.
 /// assert!((kernel.matrix().column(3).sum() - 0.5_f64.cos()).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -1,6 +1,6 @@
 //! An estimate, its interval, and the check of one number against another.
 
-/// From where to where.
+/// An interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower end.
@@ -9,7 +9,7 @@ pub struct Interval {
     pub upper: f64,
 }
 
-/// A value with its interval, if a bootstrap was asked for.
+/// A value with its interval, if a bootstrap was requested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The value.
@@ -18,11 +18,11 @@ pub struct Estimate {
     pub interval: Option<Interval>,
 }
 
-/// Two ways to the same number.
+/// The same number computed in two ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossCheck {
-    /// As counted on the sections.
+    /// Counted on the sections.
     pub observed: f64,
-    /// As the densities have it.
+    /// Computed from the densities.
     pub expected: f64,
 }

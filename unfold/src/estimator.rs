@@ -1,4 +1,4 @@
-//! Which estimator answers, how `auto` chooses, and what is fitted again for the intervals.
+//! The choice of the estimator, and what is fitted to resampled counts for the intervals.
 
 use crate::expectation_maximisation::maximise;
 use crate::log_densities::{Effort, Penalty, Start, Workspace, climb};
@@ -9,7 +9,7 @@ use crate::unfold_error::UnfoldError;
 use crate::{inverse, nnls, sparse};
 use nalgebra::{DMatrix, DVector};
 
-/// Densities of the kept bins of the kernel, and how they came about.
+/// Densities of the kept bins of the kernel, and how they were computed.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) densities: Vec<f64>,
@@ -23,7 +23,7 @@ pub(crate) struct Fit {
     pub(crate) penalty: Option<(Penalty, Option<f64>)>,
     /// Parameters in effect.
     pub(crate) parameters: f64,
-    /// ln evidence of the sparse estimate less that of the smooth one, where both were asked.
+    /// ln evidence of the sparse estimate minus that of the smooth one, if both were computed.
     pub(crate) for_sparse: Option<f64>,
     /// ln evidence, where there is one; differences count.
     pub(crate) evidence: Option<f64>,
@@ -67,7 +67,7 @@ pub(crate) fn estimate(problem: &Problem, counts: &[f64], options: &UnfoldOption
     }
 }
 
-/// Densities of counts drawn again.
+/// Densities of resampled counts.
 pub(crate) fn again(
     problem: &Problem,
     counts: &[f64],

@@ -1,4 +1,4 @@
-//! Kernels as unfolding takes them, and mixtures of the kernels of several particle types.
+//! Kernels, the input of unfolding, and mixtures of the kernels of several particle types.
 
 use crate::size_bins::{ReportedEdgesError, SizeBins};
 use nalgebra::DMatrix;
@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 ///
 /// # Examples
 ///
-/// Spheres by hand: `|x| 1 - sqrt(1 - x²)` is the share of their profiles below the relative size x.
+/// Spheres by hand: `|x| 1 - sqrt(1 - x²)` is the fraction of their profiles below the relative size x.
 ///
 /// ```
 /// use stereology_unfold::{Kernel, SizeBins, equal_edges};
@@ -32,7 +32,7 @@ pub struct Kernel {
     unit_surface: Option<f64>,
 }
 
-/// Why a matrix is no kernel, or kernels cannot be mixed.
+/// Why a matrix is not a kernel, or kernels cannot be mixed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KernelError {
@@ -64,10 +64,10 @@ pub enum KernelError {
     /// The body's surface is not a positive number.
     #[error("the body's surface area at size 1 is {0}: it must be positive and finite")]
     Surface(f64),
-    /// A capping angle that is none.
+    /// An invalid capping angle.
     #[error("the capping angle is {0}: it must lie from 0 to below a right angle, in radians")]
     CappingAngle(f64),
-    /// Fractions that are none, or as many as there are kernels.
+    /// Invalid fractions, or not one per kernel.
     #[error("{fractions} fractions for {kernels} kernels: give one a kernel, finite and not negative, not all zero")]
     Fractions {
         /// Number of fractions.

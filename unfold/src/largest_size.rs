@@ -1,4 +1,4 @@
-//! The largest size from the largest profiles, corrected for what they fall short of it.
+//! The largest size, extrapolated from the largest profiles.
 
 /// The largest particle, from the profiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -6,22 +6,22 @@
 pub struct LargestSize {
     /// The estimate.
     pub value: f64,
-    /// The largest profile: below the largest particle for certain.
+    /// The largest profile, which is never larger than the largest particle.
     pub observed: f64,
     /// Standard error of the estimate, of its own order statistics.
     pub standard_error: f64,
 }
 
-/// Profiles whose spacing tells what the largest falls short of.
+/// Number of spacings that the extrapolation uses.
 const SPACINGS: usize = 20;
 
-/// The largest size: the largest profile, and what it falls short of.
+/// The largest size: the largest profile, plus an estimate of the difference.
 ///
 /// # Formula
 ///
-/// Near the largest size D the share of profiles above D − ε grows as ε^α, with α = 1/2 if many particles are of that
-/// size and 3/2 if sizes run out evenly below it. Then with d₁ ≥ d₂ ≥ … the expected gap of d₁ is α times that between
-/// d₁ and d₂, and that to d_(k+1) is c_k times it,
+/// Near the largest size D the fraction of profiles above D − ε grows as ε^α, with α = 1/2 if many particles are of
+/// that size and 3/2 if sizes run out evenly below it. Then with d₁ ≥ d₂ ≥ … the expected gap of d₁ is α times that
+/// between d₁ and d₂, and that to d_(k+1) is c_k times it,
 ///
 /// ```text
 /// D ≈ d₁ + (d₁ − d_(k+1)) / (c_k − 1),   c_k = Γ(k + 1 + β) / (Γ(k + 1) Γ(1 + β)),   β = 1 / α

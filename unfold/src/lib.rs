@@ -12,7 +12,8 @@
 //! hand as below. Results are absolute, never only a normalised histogram, and carry what is needed to judge them:
 //! refolded counts, deviance, condition number, clamped bins, bias-corrected intervals, cross-checks, and [`Finding`]s
 //! for the symptoms the paper names. What is not known is sought in the counts too: the largest size, a capping angle
-//! ([`likely_parameter`]), shares of types ([`unknown_fractions`]); where they do not tell, that is the answer.
+//! ([`likely_parameter`]), fractions of types ([`unknown_fractions`]); the result states when the counts do not
+//! determine them.
 //!
 //! # Spheres, by hand
 //!
@@ -23,7 +24,7 @@
 //! let edges = equal_edges(1.0, 5);
 //! let bins = SizeBins::integrated(&divided_edges(&edges, 40, 0.0))?.reported_in(&edges)?;
 //! let profile_edges = divided_edges(&edges, 100, 0.0);
-//! // The share of a sphere's profiles below x diameters; its mean caliper is its diameter; nothing is lost at the rim.
+//! // The fraction of a sphere's profiles below x diameters; its mean caliper is its diameter; nothing is lost at the rim.
 //! let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
 //! let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, std::f64::consts::PI / 6.0)?;
 //!
@@ -51,7 +52,7 @@
 //! let counts = ProfileCounts::from_counts(&[0.0, 31.0, 64.0, 90.0, 75.0], &edges, 25.0)?;
 //! let options = UnfoldOptions::default().with_method(Method::Paper).with_min_size(0.2).with_bootstrap(Bootstrap::default());
 //! let found = unfold(&counts, &spheres, &options)?;
-//! assert_eq!(found.number_density[0], None); // wholly below the threshold: nothing is said
+//! assert_eq!(found.number_density[0], None); // entirely below the threshold: no density
 //! let interval = found.total.interval.ok_or("no interval")?;
 //! assert!(interval.lower < found.total.value && found.total.value < interval.upper);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -63,7 +64,7 @@
 //! |---|---|---|
 //! | [`Method::Auto`] | the smooth or the sparse estimate, by their evidence | the default; wants some 40 size bins and 100 profile bins in the kernel |
 //! | [`Method::Penalised`] | penalised likelihood, smooth as the counts say | broad distributions of sizes |
-//! | [`Method::Sparse`] | likelihood on as few bins as the counts bear | particles of a few sizes |
+//! | [`Method::Sparse`] | likelihood on as few bins as the counts support | particles of a few sizes |
 //! | [`Method::Em`] | maximum of the Poisson likelihood, converged | any distribution, with its noise |
 //! | [`Method::Ems`] | EM with smoothing after every step | for comparison with other programs |
 //! | [`Method::Nnls`] | non-negative least squares | for comparison with other programs |

@@ -85,7 +85,7 @@ pub(crate) fn log_likelihood(counts: &[f64], expected: &[f64]) -> f64 {
 pub(crate) struct Penalty {
     pub(crate) order: usize,
     pub(crate) weight: f64,
-    /// Where the penalty gives way, as a share of the nodes.
+    /// Place about which the penalty is lighter, as a fraction of the nodes.
     pub(crate) bend: Option<f64>,
 }
 
@@ -217,7 +217,7 @@ impl Workspace {
     }
 }
 
-/// The place of the largest penalised likelihood.
+/// The maximum of the penalised likelihood.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Peak {
     /// ln of the density of each node.
@@ -230,7 +230,7 @@ pub(crate) struct Peak {
     pub(crate) log_determinant: f64,
     /// Steps.
     pub(crate) iterations: usize,
-    /// Whether the last step promised less than was asked for.
+    /// Whether the last step promised less gain than required.
     pub(crate) converged: bool,
 }
 

@@ -48,7 +48,7 @@ impl Method {
     }
 }
 
-/// What a bootstrap draws again.
+/// What a bootstrap resamples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Resampling {
@@ -62,25 +62,25 @@ pub enum Resampling {
     Slices,
 }
 
-/// Intervals from counts that are drawn again and fitted again, corrected for the bias of the estimate.
+/// Intervals from counts that are resampled and fitted again, corrected for the bias of the estimate.
 ///
 /// A smooth estimate is biased towards smoothness, and its replicates would be so a second time. So what is drawn from
 /// and fitted again is rougher: order 2 with a tenth of the weight. With g its value, b the mean of the replicates less
 /// g, and σ their standard deviation, the interval is g − b ± z σ, for single bins g − b ± z √(σ² + b²), widened to
 /// hold the estimate. Other methods are their own g; the interval of [`Method::Sparse`] is that of the likelihood on
-/// all bins, so that bins given up have an upper end too.
+/// all bins, so that removed bins have an upper end too.
 ///
 /// Nominal 90 % on the paper's figure 7 covered 88 to 93 % (total, mean size, volume fraction) and 86 % or more (bins,
-/// on average), with counts drawn again or ten slices: the table is docs/figures/coverage.csv.
+/// on average), with resampled counts or ten slices: the table is docs/figures/coverage.csv.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bootstrap {
-    /// How many times counts are drawn again.
+    /// Number of resamples.
     pub replicates: usize,
     /// Nominal coverage, between 0 and 1.
     pub level: f64,
     /// Seed; same seed, same intervals, at any number of threads.
     pub seed: u64,
-    /// What is drawn again.
+    /// What is resampled.
     pub resampling: Resampling,
 }
 

@@ -1,4 +1,4 @@
-//! Several particle types or categories whose profiles are told apart: eq. (9).
+//! Several particle types or categories with labelled profiles: eq. (9).
 
 use crate::bootstrap::Replicates;
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
@@ -90,7 +90,7 @@ pub fn unfold_types(types: &[(ProfileCounts, Kernel)], options: &UnfoldOptions) 
     unfold_types_with_progress(types, options, &|_| ControlFlow::Continue(()))
 }
 
-/// [`unfold_types`] that tells how far it is and can be cancelled.
+/// [`unfold_types`] with progress and cancellation.
 ///
 /// # Errors
 ///

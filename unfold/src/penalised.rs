@@ -42,7 +42,7 @@ const HEAVIER: [f64; 2] = [10.0, 100.0];
 /// On fewer nodes than this nothing can bend.
 const LEAST_NODES_TO_BEND: usize = 16;
 
-/// The fits of all orders and weights that the counts bear, and their mean.
+/// The fits of all orders and weights that were tried, and their mean.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SmoothFit {
     /// Densities of the nodes: their logarithms averaged by evidence.

@@ -21,7 +21,7 @@ pub(crate) struct Problem {
     pub(crate) columns: Vec<usize>,
     /// Reported bin of each column of `coarse`.
     pub(crate) reported: Vec<usize>,
-    /// Column of `coarse` that each kept bin belongs to, and its share of that one's width.
+    /// Column of `coarse` that each kept bin belongs to, and its fraction of that column's width.
     pub(crate) parts: Vec<(usize, f64)>,
     pub(crate) first_row: usize,
     pub(crate) threshold: f64,
@@ -37,16 +37,16 @@ impl Problem {
             });
         }
         check(options)?;
-        let asked = options.min_size.unwrap_or(0.0);
-        if !(asked.is_finite() && asked >= 0.0) {
-            return Err(UnfoldError::Threshold(asked));
+        let requested = options.min_size.unwrap_or(0.0);
+        if !(requested.is_finite() && requested >= 0.0) {
+            return Err(UnfoldError::Threshold(requested));
         }
         let edges = counts.edges();
         // A threshold that is an edge but for rounding is that edge.
-        let first_row = edges.partition_point(|&edge| edge < asked * (1.0 - 1e-12));
+        let first_row = edges.partition_point(|&edge| edge < requested * (1.0 - 1e-12));
         let kept = counts.counts().get(first_row..).unwrap_or(&[]);
         if kept.iter().sum::<f64>() <= 0.0 {
-            return Err(UnfoldError::Threshold(asked));
+            return Err(UnfoldError::Threshold(requested));
         }
         let rows = matrix.rows(first_row, kept.len());
         let columns: Vec<usize> = (0..matrix.ncols()).filter(|&j| rows.column(j).sum() > 0.0).collect();

@@ -1,4 +1,4 @@
-//! What was seen: profiles counted by size on an examined area.
+//! Profiles counted by size on an examined area.
 
 use stereology_metrics::{EdgesError, check_edges};
 
@@ -45,7 +45,7 @@ pub enum ProfilesError {
     /// The area is not a positive number.
     #[error("the examined area is {0}: it must be positive and finite, in the square of the unit of the sizes")]
     Area(f64),
-    /// A size that is no length.
+    /// A size that is not a positive length.
     #[error("profile {index} has size {size}: sizes must be positive and finite")]
     Size {
         /// Which, from 0.
@@ -70,7 +70,7 @@ pub enum ProfilesError {
         sizes: usize,
     },
     /// Slices and sizes differ in number.
-    #[error("{slices} slices for {sizes} sizes: tell the slice of every profile")]
+    #[error("{slices} slices for {sizes} sizes: give the slice of every profile")]
     SliceCount {
         /// Number of slices.
         slices: usize,
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_profiles_are_told_apart() {
+    fn each_bad_profile_has_its_own_error() {
         let count = |sizes: &[f64], area: f64| ProfileCounts::from_sizes(sizes, None, &EDGES, area).unwrap_err();
         assert_eq!(count(&[], 1.0), ProfilesError::None);
         assert!(matches!(

@@ -1,4 +1,4 @@
-//! One number of the model by likelihood: the scale of eq. (7), the largest size, the capping angle.
+//! One parameter of the model by likelihood: the scale of eq. (7), the largest size, the capping angle.
 
 use crate::estimator::evidence;
 use crate::problem::Problem;
@@ -34,8 +34,8 @@ const DETAIL: usize = 12;
 ///
 /// For the scale s of eq. (7) with particles all alike, `kernel_of(s)` has the one size s; for the largest size it has
 /// sizes spread up to s. That is not biased low as the largest profile is. Where the density falls to nothing before
-/// the largest size, as for a single mode, no counts tell that size, and the result is `unbounded`; it does not matter
-/// either. For the capping angle see [`capped_kernel`](crate::capped_kernel).
+/// the largest size, as for a single mode, no counts determine that size, and the result is `unbounded`; it does not
+/// matter either. For the capping angle see [`capped_kernel`](crate::capped_kernel).
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! What densities say in the words of the field: means and percentiles by number and by volume, and the sieve curve.
+//! The size distribution: means and percentiles by number and by volume, and the sieve curve.
 
 use crate::estimate::Estimate;
 use crate::size_bins::SizeBins;
@@ -24,9 +24,9 @@ pub struct SizeDistribution {
     pub by_number: Percentiles,
     /// Every particle counts with its volume.
     pub by_volume: Percentiles,
-    /// The sieve curve: the share of the particles' volume below each edge of the bins, from the first to the last. A
-    /// sieve lets a particle pass by its middle axis; here the size is the diameter of the circle with the area of its
-    /// largest section.
+    /// The sieve curve: the fraction of the particles' volume below each edge of the bins, from the first to the last.
+    /// A sieve lets a particle pass by its middle axis; here the size is the diameter of the circle with the area of
+    /// its largest section.
     pub passing: Vec<Estimate>,
 }
 
@@ -98,7 +98,7 @@ impl Moments {
         }
     }
 
-    /// The size below which a share of the particles is.
+    /// The size below which a fraction of the particles lies.
     pub(crate) fn percentile(&self, densities: &[f64], weighing: Weighing, share: f64) -> f64 {
         let moments = &self.powers[usize::from(weighing == Weighing::Volume) * 3];
         let power = weighing.power() + 1;
@@ -182,7 +182,7 @@ mod tests {
     }
 
     proptest! {
-        /// Percentiles rise with their share and lie between the edges; volume's are never below number's.
+        /// Percentiles increase with their fraction and lie between the edges; volume's are never below number's.
         #[test]
         fn percentiles_are_ordered(densities in prop::collection::vec(0.0..1.0_f64, 6)) {
             prop_assume!(densities.iter().sum::<f64>() > 0.1);

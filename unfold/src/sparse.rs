@@ -1,4 +1,4 @@
-//! The sparse estimate: the largest likelihood with as few size bins as the counts bear.
+//! The sparse estimate: the largest likelihood with as few size bins as the counts support.
 //!
 //! Every bin is worth keeping only if it raises the log-likelihood by more than its price, ½ ln n + ln 2 for n
 //! profiles: half of Schwarz's criterion, and odds of two to one against every bin. Bins are given up one by one, the
@@ -9,7 +9,7 @@ use crate::log_densities::{Design, Effort, Peak, Penalty, Start, Workspace, clim
 use crate::penalised::level;
 use nalgebra::DMatrix;
 
-/// Densities of the bins; those given up are zero.
+/// Densities of the bins; those of removed bins are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SparseFit {
     pub(crate) densities: Vec<f64>,
@@ -51,7 +51,7 @@ pub(crate) fn choose(matrix: &DMatrix<f64>, counts: &[f64]) -> SparseFit {
     best
 }
 
-/// The densities of largest likelihood, no bin given up.
+/// The densities of largest likelihood on all bins.
 pub(crate) fn on_all(matrix: &DMatrix<f64>, counts: &[f64]) -> Vec<f64> {
     let design = Design::new(matrix);
     let mut room = Workspace::new(&design);

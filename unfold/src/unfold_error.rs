@@ -41,21 +41,19 @@ pub enum UnfoldError {
     /// A bootstrap that cannot be.
     #[error("a bootstrap needs 2 or more replicates and a level between 0 and 1, not {replicates} and {level}")]
     Bootstrap {
-        /// Replicates asked for.
+        /// Requested replicates.
         replicates: usize,
-        /// Level asked for.
+        /// Requested level.
         level: f64,
     },
     /// A tolerance that is not positive.
     #[error("the tolerance {0} must be positive")]
     Tolerance(f64),
-    /// A smoothing that is none.
+    /// A smoothing outside its range.
     #[error("the smoothing {0} must lie between 0 and 0.25")]
     Smoothing(f64),
     /// Slices to draw again that are not there.
-    #[error(
-        "slices can be drawn again from two or more, there are {0}: give the slice of every profile, or draw counts"
-    )]
+    #[error("resampling slices needs two or more, there are {0}: give the slice of every profile, or resample counts")]
     TooFewSlices(usize),
     /// Several types on different bins, or no type.
     #[error(
@@ -65,7 +63,7 @@ pub enum UnfoldError {
         /// Which, from 0.
         index: usize,
     },
-    /// A range of a parameter that is none, or holds no value that can explain the profiles.
+    /// An invalid range of a parameter, or one that contains no value that can explain the profiles.
     #[error(
         "the range {from} to {to} holds no value with which all profiles can be explained: it must be finite, rising, and reach high enough"
     )]
@@ -75,9 +73,9 @@ pub enum UnfoldError {
         /// Upper end.
         to: f64,
     },
-    /// Fractions of types that the counts do not tell.
+    /// Fractions of types that the counts do not determine.
     #[error(
-        "the counts do not tell the fractions of the types: type {index} could be {:.0} to {:.0} % (condition number {condition_number:.0}); give the fractions, or label the profiles",
+        "the counts do not determine the fractions of the types: type {index} could be {:.0} to {:.0} % (condition number {condition_number:.0}); give the fractions, or label the profiles",
         100.0 * .lower, 100.0 * .upper
     )]
     FractionsUnknowable {
@@ -90,16 +88,16 @@ pub enum UnfoldError {
         /// How alike the profiles of the types are.
         condition_number: f64,
     },
-    /// A kernel that is none.
+    /// An invalid kernel.
     #[error(transparent)]
     Kernel(#[from] KernelError),
-    /// Edges that make no bins.
+    /// Edges that bound no bins.
     #[error(transparent)]
     Edges(#[from] EdgesError),
     /// Reported bins that are not made of whole bins.
     #[error(transparent)]
     Reported(#[from] ReportedEdgesError),
-    /// The caller broke off.
+    /// The caller cancelled.
     #[error("cancelled")]
     Cancelled,
 }

@@ -1,4 +1,4 @@
-//! From profiles per area to particles per volume: the result, what it claims, and how far to trust it.
+//! From profiles per area to particles per volume: the result, its intervals and its checks.
 
 use crate::bootstrap::{Deviation, Replicates, Source, replicate, slices_drawn};
 use crate::estimate::{CrossCheck, Estimate, Interval};
@@ -135,7 +135,7 @@ impl Unfolding {
 /// use nalgebra::DMatrix;
 /// use stereology_unfold::{Kernel, Method, ProfileCounts, SizeBins, UnfoldOptions, equal_edges, unfold};
 ///
-/// // Spheres: the share of profiles below the relative size x is 1 - sqrt(1 - x²).
+/// // Spheres: the fraction of profiles below the relative size x is 1 - sqrt(1 - x²).
 /// let f = |x: f64| if x < 1.0 { 1.0 - (1.0 - x * x).sqrt() } else { 1.0 };
 /// let edges = equal_edges(2.0, 2);
 /// let matrix = DMatrix::from_fn(2, 2, |i, j| edges[j + 1] * (f(edges[i + 1] / edges[j + 1]) - f(edges[i] / edges[j + 1])));
@@ -152,7 +152,7 @@ pub fn unfold(counts: &ProfileCounts, kernel: &Kernel, options: &UnfoldOptions) 
     unfold_with_progress(counts, kernel, options, &|_| ControlFlow::Continue(()))
 }
 
-/// [`unfold`] that tells how far its bootstrap is and can be cancelled.
+/// [`unfold`] with progress of the bootstrap, and cancellation.
 ///
 /// # Errors
 ///
@@ -273,7 +273,7 @@ impl Quantities<'_> {
         self.estimate_up_to(f64::INFINITY, quantity)
     }
 
-    /// Of a quantity that cannot be larger than `most`: a share, a size.
+    /// Estimate of a quantity that cannot be larger than `most`: a fraction or a size.
     pub(crate) fn estimate_up_to(&self, most: f64, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
         let value = quantity(self.densities);
         Estimate {

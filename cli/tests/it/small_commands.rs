@@ -187,7 +187,7 @@ fn unfolding_finds_what_is_not_known() {
         ]
         .concat(),
     );
-    assert!(refused.0 == 1 && refused.2.contains("do not tell"), "{refused:?}");
+    assert!(refused.0 == 1 && refused.2.contains("do not determine"), "{refused:?}");
     let two = path(&folder, "two.csv");
     fs::write(&two, "size\n0.5\n0.7\n").unwrap();
     let few = answer(&["unfold", &two, "--area", "10"]);

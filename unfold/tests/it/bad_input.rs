@@ -1,4 +1,4 @@
-//! Whatever is wrong, it is said; what is merely little is unfolded with a warning.
+//! Wrong input is an error; little data are unfolded with a warning.
 
 use crate::spheres;
 use stereology_unfold::{Bootstrap, Method, ProfileCounts, UnfoldError, UnfoldOptions, equal_edges, unfold};
@@ -29,7 +29,8 @@ fn one_profile_and_equal_profiles_are_unfolded_with_a_warning() {
     }
 }
 
-/// With one profile intervals are wide, but the mean size does not exceed the largest size, nor a cumulative fraction 1.
+/// With one profile intervals are wide, but the mean size does not exceed the largest size, nor a cumulative fraction
+/// 1.
 #[test]
 fn intervals_stay_where_values_can_be() {
     let (kernel, edges) = spheres::fine(&equal_edges(0.5, 1));

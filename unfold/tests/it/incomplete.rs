@@ -1,4 +1,4 @@
-//! What is not seen: edges of the picture, fines lost at the rim, sizes and fractions that are not known.
+//! What is not observed: edges of the image, fines lost at the rim, sizes and fractions that are not known.
 
 use crate::experiment::{AREA, DISTRIBUTIONS, Design};
 use crate::spheres;

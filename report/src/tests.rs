@@ -203,7 +203,7 @@ fn the_page_shows_the_verdict() {
     assert_eq!(input.verdict.level(), Level::Care); // a warning about small profiles
     let html = page(&input);
     assert!(html.contains("Trustworthy with care") && html.contains("Numbers: with care (outlines of the profiles)"));
-    assert!(html.contains("smallest gap 0.0002 of the mean size"));
+    assert!(html.contains("smallest gap 2.00e-4 of the mean size"));
     input.verdict = made_up_verdict(&[]);
     let html = page(&input);
     assert!(html.contains("All 12 checks are good") && html.contains("Numbers: good. Appearance: good."));

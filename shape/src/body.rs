@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::closed_mesh::{ClosedMesh, MeshError};
 #[cfg(feature = "io")]
-use crate::control_sphere::ControlSphere;
-use crate::elliptic::{self, carlson_rg};
-use crate::hull::convex_hull;
-use crate::largest_section::largest_section_area;
-use crate::rock;
-use crate::section::Slicer;
-use crate::superellipsoid::{EXPONENTS, superellipsoid};
-use crate::triangle_mesh::TriangleMesh;
+use crate::generate::control_sphere::ControlSphere;
+use crate::generate::rock;
+use crate::generate::superellipsoid::{EXPONENTS, superellipsoid};
+use crate::mesh::closed_mesh::ClosedMesh;
+use crate::mesh::hull::convex_hull;
+use crate::mesh::mesh_error::MeshError;
+use crate::mesh::triangle_mesh::TriangleMesh;
+use crate::query::elliptic::{self, carlson_rg};
+use crate::section::largest_section::largest_section_area;
+use crate::section::slicer::Slicer;
 
 /// A solid body in its own unit of length and its own place, measured once.
 ///
@@ -99,14 +100,14 @@ pub enum BodyError {
     Exponent(f64),
     /// Points have no hull.
     #[error(transparent)]
-    Hull(#[from] crate::hull::HullError),
+    Hull(#[from] crate::mesh::quickhull::HullError),
     /// The points of a file have no hull.
     #[error("{path}: {source}")]
     HullOf {
         /// The file.
         path: String,
         /// What is wrong with its points.
-        source: crate::hull::HullError,
+        source: crate::mesh::quickhull::HullError,
     },
     /// The control points of a file make no surface.
     #[error("{path}: {source}")]
@@ -114,7 +115,7 @@ pub enum BodyError {
         /// The file.
         path: String,
         /// What is wrong with its control points.
-        source: crate::control_sphere::ControlSphereError,
+        source: crate::generate::control_sphere::ControlSphereError,
     },
     /// The triangles enclose no solid.
     #[error(transparent)]
@@ -130,7 +131,7 @@ pub enum BodyError {
     /// The mesh file cannot be read.
     #[cfg(feature = "io")]
     #[error(transparent)]
-    File(#[from] crate::mesh_file::MeshFileError),
+    File(#[from] crate::file::mesh_file_error::MeshFileError),
 }
 
 /// Sides of the prism that stands for a cylinder.
@@ -362,7 +363,7 @@ impl Body {
                 Self::superellipsoid([a, b, c], [e1, e2])
             }
             #[cfg(feature = "io")]
-            "hull" => Self::hull(&crate::point_file::read_points(rest)?).map_err(|error| match error {
+            "hull" => Self::hull(&crate::file::point_file::read_points(rest)?).map_err(|error| match error {
                 BodyError::Hull(source) => BodyError::HullOf {
                     path: rest.to_owned(),
                     source,
@@ -382,10 +383,10 @@ impl Body {
         {
             return Self::from_control_points(spec);
         }
-        if crate::mesh_file::MeshFormat::from_path(path).is_err() {
+        if crate::file::mesh_file::MeshFormat::from_path(path).is_err() {
             return Err(BodyError::UnknownShape { spec: spec.to_owned() });
         }
-        let mesh = crate::mesh_file::read_mesh(path)?;
+        let mesh = crate::file::mesh_file::read_mesh(path)?;
         let closed = ClosedMesh::welded_within(mesh, weld).map_err(|source| BodyError::MeshOf {
             path: spec.to_owned(),
             source,
@@ -395,10 +396,11 @@ impl Body {
 
     #[cfg(feature = "io")]
     fn from_control_points(spec: &str) -> Result<Self, BodyError> {
-        let text = std::fs::read_to_string(spec).map_err(|source| crate::mesh_file::MeshFileError::Read {
-            path: spec.into(),
-            source,
-        })?;
+        let text =
+            std::fs::read_to_string(spec).map_err(|source| crate::file::mesh_file_error::MeshFileError::Read {
+                path: spec.into(),
+                source,
+            })?;
         let sphere = ControlSphere::from_json(&text).map_err(|source| BodyError::ControlPoints {
             path: spec.to_owned(),
             source,
@@ -556,7 +558,7 @@ pub(crate) fn mesh_profile_areas(mesh: &ClosedMesh, normal: &UnitVector3<f64>, o
     slicer
         .profiles(offset, 0..mesh.triangles().len())
         .iter()
-        .map(crate::section::FlatProfile::area)
+        .map(crate::section::slicer::FlatProfile::area)
         .collect()
 }
 

@@ -40,76 +40,43 @@
 
 mod arrangement;
 mod body;
-mod chord;
-mod closed_mesh;
-mod coloured_mesh;
 #[cfg(feature = "io")]
-mod coloured_mesh_file;
-mod control_sphere;
-mod convex;
-mod corner_normals;
-mod elliptic;
-#[cfg(feature = "io")]
-mod glb;
-mod hull;
-mod inside;
-mod largest_section;
-mod measures;
-#[cfg(feature = "io")]
-mod mesh_file;
-mod near_points;
-mod nearest;
-#[cfg(feature = "io")]
-mod obj;
+mod file;
+mod generate;
+mod mesh;
 mod particle;
 mod periodic_box;
-#[cfg(feature = "io")]
-mod ply;
-#[cfg(feature = "io")]
-mod point_file;
-#[cfg(feature = "io")]
-mod polygon;
-mod primitives;
-mod rock;
+mod query;
 mod section;
-mod section_areas;
-mod self_intersection;
-mod spherical_harmonics;
-#[cfg(feature = "io")]
-mod stl;
-mod subdivision;
-mod superellipsoid;
-mod textured_mesh;
-#[cfg(feature = "io")]
-mod textured_mesh_file;
-mod topology;
-mod triangle_mesh;
 mod unit_body;
-mod winding;
 
 pub use arrangement::{Arrangement, ArrangementError};
 pub use body::{Body, BodyError, BodyKind};
-pub use chord::{Chord, Chords};
-pub use closed_mesh::{ClosedMesh, MeshError, Repair};
-pub use coloured_mesh::ColouredMesh;
 #[cfg(feature = "io")]
-pub use coloured_mesh_file::write_coloured_mesh;
-pub use control_sphere::{ControlSphere, ControlSphereError};
-pub use corner_normals::corner_normals;
-pub use hull::{HullError, convex_hull};
-pub use inside::InsideTest;
+pub use file::coloured_mesh_file::write_coloured_mesh;
 #[cfg(feature = "io")]
-pub use mesh_file::{MeshFileError, MeshFileFault, MeshFilePlace, MeshFormat, read_mesh, write_mesh};
+pub use file::mesh_file::{MeshFormat, read_mesh, write_mesh};
+#[cfg(feature = "io")]
+pub use file::mesh_file_error::{MeshFileError, MeshFileFault, MeshFilePlace};
+#[cfg(feature = "io")]
+pub use file::point_file::{parse_points, read_points};
+#[cfg(feature = "io")]
+pub use file::textured_mesh_file::write_textured_mesh;
+pub use generate::control_sphere::{ControlSphere, ControlSphereError};
+pub use mesh::closed_mesh::ClosedMesh;
+pub use mesh::coloured_mesh::ColouredMesh;
+pub use mesh::corner_normals::corner_normals;
+pub use mesh::hull::convex_hull;
+pub use mesh::mesh_error::{MeshError, Repair};
+pub use mesh::quickhull::HullError;
+pub use mesh::self_intersection::self_intersections;
+pub use mesh::subdivision::Subdivision;
+pub use mesh::textured_mesh::{Texture, TexturedMesh};
+pub use mesh::triangle_mesh::TriangleMesh;
 pub use particle::{Particle, isotropic_rotation};
 pub use periodic_box::{BoxError, PeriodicBox};
-#[cfg(feature = "io")]
-pub use point_file::{parse_points, read_points};
-pub use section::{SectionPolygon, section_polygons};
-pub use section_areas::{Knots, SectionAreas};
-pub use self_intersection::self_intersections;
-pub use subdivision::Subdivision;
-pub use textured_mesh::{Texture, TexturedMesh};
-#[cfg(feature = "io")]
-pub use textured_mesh_file::write_textured_mesh;
-pub use triangle_mesh::TriangleMesh;
+pub use query::chord::{Chord, Chords};
+pub use query::inside::InsideTest;
+pub use section::section_areas::{Knots, SectionAreas};
+pub use section::slicer::{SectionPolygon, section_polygons};
 pub use unit_body::UnitBody;

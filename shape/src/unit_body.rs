@@ -6,12 +6,12 @@ use std::sync::Arc;
 use nalgebra::{Point3, UnitVector3, Vector3, Vector4};
 
 use crate::body::{Body, BodyKind, mesh_profile_areas};
-use crate::chord::Chords;
-use crate::closed_mesh::ClosedMesh;
-use crate::convex::{SupportMap, half_spaces};
-use crate::elliptic;
-use crate::inside::Columns;
-use crate::nearest::BoxTree;
+use crate::mesh::closed_mesh::ClosedMesh;
+use crate::query::chord::Chords;
+use crate::query::convex::{SupportMap, half_spaces};
+use crate::query::elliptic;
+use crate::query::inside::Columns;
+use crate::query::nearest::BoxTree;
 
 /// A [`Body`] moved so that its centroid is at the origin and scaled to size 1: the circle with the area of its largest section has
 /// diameter 1. What a [`Particle`](crate::Particle) turns, scales and moves.

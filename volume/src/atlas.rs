@@ -1,9 +1,9 @@
 //! A mesh of few triangles with the solid's texture in a picture: a baked atlas.
 
-use crate::Solid;
-use crate::carve::{CarveError, check};
+use crate::carve_error::{CarveError, MOST_PIXELS, check};
 use crate::charts::{Chart, Layout, MARGIN, Rectangle, charts, least_side};
 use crate::colour::{add, to_bytes};
+use crate::solid::Solid;
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 use stereology_metrics::Progress;
@@ -43,8 +43,6 @@ pub struct Baked {
     pub used: f64,
 }
 
-/// The largest picture that most readers take.
-pub(crate) const MOST_PIXELS: u32 = 16_384;
 /// Rows between two calls of `progress`.
 const ROWS: u32 = 32;
 

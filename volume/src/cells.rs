@@ -5,7 +5,7 @@
     reason = "cells are fewer than 2^27, particles and their places checked by Solid::new"
 )]
 
-use crate::strip::Images;
+use crate::images::{Image, Images, NONE};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
@@ -15,7 +15,6 @@ const CELLS_PER_PARTICLE: f64 = 32.0;
 const MOST_CELLS_PER_SIDE: f64 = 512.0;
 /// Share of a cell by which its bounds are widened, more than the rounding of its coordinates.
 const SLACK: f64 = 1e-9;
-pub(crate) const NONE: u32 = u32::MAX;
 
 /// The particles as placed bodies, and the cells of the box that they reach into.
 #[derive(Clone, Debug)]
@@ -42,24 +41,6 @@ struct Placed {
     /// Radii, about the centre, of the balls outside and inside the particle.
     outer: f64,
     inner: f64,
-}
-
-/// One of the periodic images of a particle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Image {
-    pub(crate) centre: Point3<f64>,
-    pub(crate) outer_squared: f64,
-    pub(crate) particle: u32,
-}
-
-impl Image {
-    pub(crate) fn new(centre: Point3<f64>, outer: f64, particle: u32) -> Self {
-        Self {
-            centre,
-            outer_squared: outer * outer,
-            particle,
-        }
-    }
 }
 
 /// How a cell lies to a particle.

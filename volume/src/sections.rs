@@ -1,6 +1,6 @@
 //! Exact sections: the profiles that a plane across an axis shows.
 
-use crate::Solid;
+use crate::solid::Solid;
 use nalgebra::{Unit, UnitVector3, Vector3};
 
 /// An axis of the box.

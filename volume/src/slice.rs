@@ -6,8 +6,9 @@
 )]
 
 use crate::colour::{add, to_bytes};
+use crate::sections::Axis;
 use crate::solid::Solid;
-use crate::{Axis, SolidError};
+use crate::solid_error::SolidError;
 use image::RgbImage;
 use nalgebra::{Point3, Unit, UnitVector3, Vector3};
 use ndarray::Array2;

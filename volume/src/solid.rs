@@ -3,6 +3,7 @@
 use crate::cells::Cells;
 use crate::colour::add;
 use crate::residual::{Field, Lookup, Residual};
+use crate::solid_error::{LARGEST_PARTICLE, MOST_BORDER_SAMPLES, SolidError};
 use crate::strip::Strip;
 use crate::voids::Voids;
 use nalgebra::{Point3, Vector3};
@@ -12,8 +13,6 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 use stereology_shape::{Arrangement, Particle, PeriodicBox, UnitBody};
 
-/// A particle may be this many times the shortest side of the box across, its own images overlapping then: a guard against sizes and boxes of different units.
-const LARGEST_PARTICLE: f64 = 2.0;
 /// The balls about the particles may have this many times the volume of the box.
 const MOST_CROWDED: f64 = 64.0;
 /// Relative error allowed where a side of the box must be a multiple of the residual's period.
@@ -54,7 +53,7 @@ pub struct Solid {
     residual: Option<Arc<Fields>>,
     lookup: Lookup,
     border_samples: u32,
-    pub(crate) voids: Option<Arc<Voids>>,
+    voids: Option<Arc<Voids>>,
 }
 
 #[derive(Debug)]
@@ -62,108 +61,6 @@ struct Fields {
     binder: Field,
     particles: Field,
     voxel: f64,
-}
-
-/// Largest number of points per pixel along each axis.
-const MOST_BORDER_SAMPLES: u32 = 16;
-
-/// Why particles, colours and residual do not make a solid.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SolidError {
-    /// A particle is far larger than the box.
-    #[error(
-        "particle {particle} of size {size} is more than {LARGEST_PARTICLE} times the box's shortest side of {side}; are both in the same unit?"
-    )]
-    TooLarge {
-        /// Index of the particle.
-        particle: usize,
-        /// Its size.
-        size: f64,
-        /// The box's shortest side.
-        side: f64,
-    },
-    /// The particles overlap many times over.
-    #[error(
-        "the balls about the particles have {times:.0} times the volume of the box; are sizes and box in the same unit?"
-    )]
-    Crowded {
-        /// Volume of the balls over that of the box.
-        times: f64,
-    },
-    /// Category 255 has no number left in the exported channel, where 0 is the binder.
-    #[error("particle {particle} is of category 255; categories go from 0 to 254")]
-    Category {
-        /// Index of the particle.
-        particle: usize,
-    },
-    /// There must be one colour a particle.
-    #[error("{colours} colours for {particles} particles; give one each")]
-    Colours {
-        /// Colours given.
-        colours: usize,
-        /// Particles given.
-        particles: usize,
-    },
-    /// A colour is no finite number.
-    #[error("the colour of {} is not finite", match particle { Some(i) => format!("particle {i}"), None => "the binder".into() })]
-    Colour {
-        /// Index of the particle; `None`: the binder's colour.
-        particle: Option<usize>,
-    },
-    /// A residual is empty, not of three channels, not finite, or its voxel is no positive length.
-    #[error(
-        "the residual of the {part} has axes (z, y, x, channel) {shape:?} and voxel {voxel}; it needs at least one voxel, three channels, finite values and a positive voxel"
-    )]
-    Residual {
-        /// `binder` or `particles`.
-        part: &'static str,
-        /// Shape of the array given.
-        shape: [usize; 4],
-        /// Edge of a voxel.
-        voxel: f64,
-    },
-    /// A void is of a shape that is not there.
-    #[error("shape {shape} cannot be a void: there are {bodies} shapes, counted from 0")]
-    Void {
-        /// The shape named.
-        shape: usize,
-        /// Number of bodies.
-        bodies: usize,
-    },
-    /// A plane has no direction or no place.
-    #[error("no plane has normal {normal:?} and offset {offset}; the normal must not be zero, and all must be finite")]
-    Plane {
-        /// The normal given.
-        normal: [f64; 3],
-        /// The offset given.
-        offset: f64,
-    },
-    /// A picture that cannot be made.
-    #[error("no picture has {width} x {height} pixels of edge {pixel}; ask for 1 to 2^30 pixels of a positive edge")]
-    Picture {
-        /// Pixels along a row.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Edge of a pixel.
-        pixel: f64,
-    },
-    /// Too few or too many points per pixel.
-    #[error("{0} points per pixel along each axis; 1 to {MOST_BORDER_SAMPLES} are possible")]
-    BorderSamples(u32),
-    /// The residual does not repeat with the box.
-    #[error(
-        "the box's side of {side} along {axis} is no multiple of the residual's period of {period}; round the box, or the solid would have a seam"
-    )]
-    Period {
-        /// `x`, `y` or `z`.
-        axis: char,
-        /// The box's side.
-        side: f64,
-        /// The residual's period.
-        period: f64,
-    },
 }
 
 impl Solid {
@@ -233,6 +130,57 @@ impl Solid {
             residual: None,
             ..self.clone()
         }
+    }
+
+    /// The same solid whose particles of these shapes (indices of [`Self::bodies`]) are voids.
+    ///
+    /// They keep the colour that their profiles have on a photograph, which slices and voxels show; their alpha is 0, and pictures and carved meshes show holes.
+    ///
+    /// # Errors
+    ///
+    /// [`SolidError::Void`] if there is no such shape.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
+    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
+    /// # use stereology_volume::Solid;
+    /// # let bubble = UnitBody::new(&Body::sphere(1.0)?);
+    /// # let particle = Particle { shape: 0, size: 4.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
+    /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
+    /// let foam = Solid::new(Arrangement::new(vec![bubble], vec![particle], period)?, vec![[0.2; 3]], [0.8; 3], None)?.with_voids(&[0])?;
+    /// assert!(foam.is_void_at(&Point3::new(9.0, 0.0, 0.0)));
+    /// assert_eq!(foam.void_distance_at(&Point3::new(0.0, 5.0, 0.0)), 3.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn with_voids(self, shapes: &[usize]) -> Result<Self, SolidError> {
+        let voids = Voids::new(&self.arrangement, shapes)?.map(Arc::new);
+        Ok(Self { voids, ..self })
+    }
+
+    /// The shapes that are voids, in ascending order.
+    #[must_use]
+    pub fn voids(&self) -> &[usize] {
+        self.voids.as_ref().map_or(&[], |voids| voids.shapes())
+    }
+
+    /// Whether a point is in a void: its alpha is 0.
+    #[must_use]
+    pub fn is_void_at(&self, p: &Point3<f64>) -> bool {
+        let p = self.period().wrap(p);
+        self.voids
+            .as_ref()
+            .is_some_and(|voids| voids.contain(self.bodies(), &p))
+    }
+
+    /// Distance to the nearest surface of a void, negative inside a void; infinite without voids.
+    #[must_use]
+    pub fn void_distance_at(&self, p: &Point3<f64>) -> f64 {
+        let p = self.period().wrap(p);
+        self.voids
+            .as_ref()
+            .map_or(f64::INFINITY, |voids| voids.distance(self.bodies(), &p))
     }
 
     /// The particles and their box.
@@ -341,6 +289,11 @@ impl Solid {
     /// The particles that some rows meet.
     pub(crate) fn strip(&self, z: f64, ys: [f64; 2]) -> Strip<'_> {
         self.cells.strip(self.bodies(), z, ys)
+    }
+
+    /// The voids that some rows meet; `None` without voids.
+    pub(crate) fn strip_of_voids(&self, z: f64, ys: [f64; 2]) -> Option<Strip<'_>> {
+        self.voids.as_ref().map(|voids| voids.strip(self.bodies(), z, ys))
     }
 
     /// The residuals of binder and particles.

@@ -5,53 +5,12 @@
     reason = "a row has fewer than 2^32 points; images of a particle are few"
 )]
 
-use crate::cells::{Cells, Image, NONE};
+use crate::cells::Cells;
+use crate::images::{Image, NONE};
 use crate::row::Row;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
-use stereology_shape::{Chords, Particle, PeriodicBox, UnitBody};
-
-/// All images of the particles that reach into the box, by height.
-#[derive(Clone, Debug)]
-pub(crate) struct Images {
-    /// By the z of their centres, ascending.
-    images: Vec<Image>,
-    /// The largest radius.
-    reach: f64,
-}
-
-impl Images {
-    /// Of particles with these radii about their centres.
-    pub(crate) fn new(particles: &[Particle], outer: impl Fn(usize) -> f64, period: &PeriodicBox) -> Self {
-        let sides = period.sides();
-        let mut images = Vec::with_capacity(particles.len());
-        let mut reach = 0.0_f64;
-        for (index, particle) in (0..).zip(particles) {
-            let (home, radius) = (period.wrap(&particle.position), outer(index as usize));
-            reach = reach.max(radius);
-            let along = |k: usize| {
-                let turns = (radius / sides[k]).ceil() as i32;
-                (-turns..=turns)
-                    .map(move |turn| home[k] + f64::from(turn) * sides[k])
-                    .filter(move |x| x + radius > 0.0 && x - radius < sides[k])
-            };
-            for z in along(2) {
-                for y in along(1) {
-                    images.extend(along(0).map(|x| Image::new(Point3::new(x, y, z), radius, index)));
-                }
-            }
-        }
-        images.sort_by(|a, b| a.centre.z.total_cmp(&b.centre.z));
-        Self { images, reach }
-    }
-
-    /// Those that can hold a point at this z.
-    fn near(&self, z: f64) -> &[Image] {
-        let first = self.images.partition_point(|image| image.centre.z < z - self.reach);
-        let end = self.images.partition_point(|image| image.centre.z <= z + self.reach);
-        &self.images[first..end]
-    }
-}
+use stereology_shape::{Chords, UnitBody};
 
 /// What rows at one z and neighbouring y meet.
 #[derive(Debug)]

@@ -1,11 +1,10 @@
 //! Particles that are voids: the pores of a sponge, the bubbles of a foam.
 
 use crate::cells::Cells;
+use crate::solid_error::SolidError;
 use crate::strip::Strip;
-use crate::{Solid, SolidError};
 use nalgebra::Point3;
-use std::sync::Arc;
-use stereology_shape::Particle;
+use stereology_shape::{Arrangement, Particle, UnitBody};
 
 /// Which shapes are voids, and where they are.
 #[derive(Debug)]
@@ -14,78 +13,46 @@ pub(crate) struct Voids {
     cells: Cells,
 }
 
-impl Solid {
-    /// The same solid whose particles of these shapes (indices of [`Self::bodies`]) are voids.
-    ///
-    /// They keep the colour that their profiles have on a photograph, which slices and voxels show; their alpha is 0, and pictures and carved meshes show holes.
-    ///
-    /// # Errors
-    ///
-    /// [`SolidError::Void`] if there is no such shape.
-    ///
-    /// # Examples
-    ///
-    /// ```
-    /// # use nalgebra::{Point3, UnitQuaternion, Vector3};
-    /// # use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
-    /// # use stereology_volume::Solid;
-    /// # let bubble = UnitBody::new(&Body::sphere(1.0)?);
-    /// # let particle = Particle { shape: 0, size: 4.0, category: 0, position: Point3::origin(), orientation: UnitQuaternion::identity() };
-    /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
-    /// let foam = Solid::new(Arrangement::new(vec![bubble], vec![particle], period)?, vec![[0.2; 3]], [0.8; 3], None)?.with_voids(&[0])?;
-    /// assert!(foam.is_void_at(&Point3::new(9.0, 0.0, 0.0)));
-    /// assert_eq!(foam.void_distance_at(&Point3::new(0.0, 5.0, 0.0)), 3.0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn with_voids(mut self, shapes: &[usize]) -> Result<Self, SolidError> {
-        let bodies = self.bodies().len();
+impl Voids {
+    /// The particles of these shapes; `None` without shapes.
+    pub(crate) fn new(arrangement: &Arrangement, shapes: &[usize]) -> Result<Option<Self>, SolidError> {
+        let bodies = arrangement.bodies().len();
         if let Some(&shape) = shapes.iter().find(|&&shape| shape >= bodies) {
             return Err(SolidError::Void { shape, bodies });
         }
         if shapes.is_empty() {
-            self.voids = None;
-            return Ok(self);
+            return Ok(None);
         }
         let mut shapes = shapes.to_vec();
         shapes.sort_unstable();
         shapes.dedup();
-        let hollow: Vec<Particle> = self
+        let hollow: Vec<Particle> = arrangement
             .particles()
             .iter()
             .filter(|particle| shapes.contains(&particle.shape))
             .copied()
             .collect();
-        let cells = Cells::new(self.bodies(), &hollow, self.period());
-        self.voids = Some(Arc::new(Voids { shapes, cells }));
-        Ok(self)
+        let cells = Cells::new(arrangement.bodies(), &hollow, arrangement.period());
+        Ok(Some(Self { shapes, cells }))
     }
 
-    /// The shapes that are voids, in ascending order.
-    #[must_use]
-    pub fn voids(&self) -> &[usize] {
-        self.voids.as_ref().map_or(&[], |voids| &voids.shapes)
+    /// In ascending order.
+    pub(crate) fn shapes(&self) -> &[usize] {
+        &self.shapes
     }
 
-    /// Whether a point is in a void: its alpha is 0.
-    #[must_use]
-    pub fn is_void_at(&self, p: &Point3<f64>) -> bool {
-        let p = self.period().wrap(p);
-        self.voids
-            .as_ref()
-            .is_some_and(|voids| voids.cells.particle_at(self.bodies(), &p).is_some())
+    /// Whether a point of the box is in a void.
+    pub(crate) fn contain(&self, bodies: &[UnitBody], p: &Point3<f64>) -> bool {
+        self.cells.particle_at(bodies, p).is_some()
     }
 
-    /// The voids that some rows meet, none of a solid without.
-    pub(crate) fn strip_of_voids(&self, z: f64, ys: [f64; 2]) -> Option<Strip<'_>> {
-        self.voids.as_ref().map(|voids| voids.cells.strip(self.bodies(), z, ys))
+    /// The voids that some rows meet.
+    pub(crate) fn strip<'a>(&'a self, bodies: &'a [UnitBody], z: f64, ys: [f64; 2]) -> Strip<'a> {
+        self.cells.strip(bodies, z, ys)
     }
 
-    /// Distance to the nearest surface of a void, negative in one; infinite without voids.
-    #[must_use]
-    pub fn void_distance_at(&self, p: &Point3<f64>) -> f64 {
-        let p = self.period().wrap(p);
-        self.voids
-            .as_ref()
-            .map_or(f64::INFINITY, |voids| voids.cells.distance(self.bodies(), &p))
+    /// Signed distance from a point of the box to the nearest surface of a void.
+    pub(crate) fn distance(&self, bodies: &[UnitBody], p: &Point3<f64>) -> f64 {
+        self.cells.distance(bodies, p)
     }
 }

@@ -5,9 +5,10 @@
     reason = "ids are checked against 2^31 by Solid::new; distances are stored as f32"
 )]
 
-use crate::Solid;
 use crate::colour::row_to_bytes;
-use crate::row::{Row, RowColours};
+use crate::row::Row;
+use crate::row_colours::RowColours;
+use crate::solid::Solid;
 use crate::strip::{Runs, Strip};
 use nalgebra::{Point3, Vector3};
 use ndarray::{Array3, ArrayViewMut3};

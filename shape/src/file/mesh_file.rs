@@ -1,0 +1,174 @@
+//! Mesh files in and out: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use crate::file::mesh_file_error::MeshFileError;
+use crate::file::obj;
+use crate::file::ply;
+use crate::file::stl;
+use crate::mesh::triangle_mesh::TriangleMesh;
+
+/// The mesh formats that are read and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MeshFormat {
+    /// Wavefront text; only positions and faces are read. Written with all digits.
+    Obj,
+    /// Stereolithography; text or binary is found out on reading. Written as binary, in single precision: that is the format.
+    Stl,
+    /// Polygon file format; text or binary of either byte order is found out on reading. Written as little-endian binary, doubles.
+    Ply,
+}
+
+impl MeshFormat {
+    /// The format that a file name's ending stands for, in any case.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshFileError::Format`] if the name ends in none of .obj, .stl, .ply.
+    ///
+    /// ```
+    /// # use stereology_shape::MeshFormat;
+    /// assert_eq!(MeshFormat::from_path("rock.STL".as_ref())?, MeshFormat::Stl);
+    /// # Ok::<(), stereology_shape::MeshFileError>(())
+    /// ```
+    pub fn from_path(path: &Path) -> Result<Self, MeshFileError> {
+        let ending = path
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("obj") => Ok(Self::Obj),
+            Some("stl") => Ok(Self::Stl),
+            Some("ply") => Ok(Self::Ply),
+            _ => Err(MeshFileError::Format { path: path.to_owned() }),
+        }
+    }
+
+    /// The triangles in the bytes of a file of this format; `name` is what errors call it.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshFileError::Content`]: the place and the fault.
+    ///
+    /// ```
+    /// # use stereology_shape::MeshFormat;
+    /// let mesh = MeshFormat::Obj.parse(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "drop.obj".as_ref())?;
+    /// assert_eq!(mesh.triangles, [[0, 1, 2]]);
+    /// # Ok::<(), stereology_shape::MeshFileError>(())
+    /// ```
+    pub fn parse(self, bytes: &[u8], name: &Path) -> Result<TriangleMesh, MeshFileError> {
+        let mesh = match self {
+            Self::Obj => obj::parse(bytes),
+            Self::Stl => stl::parse(bytes),
+            Self::Ply => ply::parse(bytes),
+        };
+        mesh.map_err(|(place, fault)| MeshFileError::Content {
+            path: name.to_owned(),
+            place,
+            fault,
+        })
+    }
+}
+
+/// Reads the triangles of a mesh file; the ending of its name tells the format. Faces with more corners are cut into triangles.
+///
+/// Vertices come as they are in the file: texture or normal seams of an OBJ do not split them, and [`ClosedMesh`](crate::ClosedMesh)
+/// welds equal positions and says so. An STL file has no shared vertices: equal positions are one vertex from the start.
+///
+/// # Errors
+///
+/// [`MeshFileError`]: the file, the place in it and the fault. A file that is cut short is never read in part.
+///
+/// # Examples
+///
+/// ```
+/// use stereology_shape::{TriangleMesh, read_mesh, write_mesh};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("box.obj");
+/// let mesh = TriangleMesh::cuboid([0.1, 0.2, 0.3]);
+/// write_mesh(&path, &mesh)?;
+/// assert_eq!(read_mesh(&path)?, mesh);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> {
+    let path = path.as_ref();
+    let format = MeshFormat::from_path(path)?;
+    let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    format.parse(&bytes, path)
+}
+
+/// Writes triangles as a mesh file; the ending of its name tells the format. An existing file is replaced, and only by a whole one: the
+/// new file is written beside as `FILE.partial` and renamed.
+///
+/// OBJ and PLY keep every bit of the positions; STL holds them in single precision.
+///
+/// # Errors
+///
+/// [`MeshFileError::Format`] if the name tells no format, [`MeshFileError::Write`] if the file cannot be written.
+///
+/// ```
+/// # use stereology_shape::{TriangleMesh, read_mesh, write_mesh};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("ball.ply");
+/// write_mesh(&path, &TriangleMesh::icosphere(1.0, 2))?;
+/// assert_eq!(read_mesh(&path)?.triangles.len(), 320);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), MeshFileError> {
+    let path = path.as_ref();
+    let format = MeshFormat::from_path(path)?;
+    write_whole(path, |out| {
+        check_indices(mesh)?;
+        match format {
+            MeshFormat::Obj => obj::write(out, mesh),
+            MeshFormat::Stl => stl::write(out, mesh),
+            MeshFormat::Ply => ply::write(out, mesh),
+        }
+    })
+}
+
+/// Writes `FILE.partial` and renames it when it is whole.
+pub(crate) fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), MeshFileError> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let write = || {
+        let mut out = BufWriter::new(File::create(&partial)?);
+        write(&mut out)?;
+        out.into_inner()
+            .map_err(std::io::IntoInnerError::into_error)?
+            .sync_all()?;
+        std::fs::rename(&partial, path)
+    };
+    write().map_err(|source| {
+        // There is nobody to tell if the removal fails.
+        let _ = std::fs::remove_file(&partial);
+        MeshFileError::Write {
+            path: path.to_owned(),
+            source,
+        }
+    })
+}
+
+pub(crate) fn check_indices(mesh: &TriangleMesh) -> std::io::Result<()> {
+    let vertices = mesh.vertices.len();
+    match mesh
+        .triangles
+        .iter()
+        .position(|corners| corners.iter().any(|&i| i as usize >= vertices))
+    {
+        None => Ok(()),
+        Some(t) => {
+            let message = format!("triangle {t} names a vertex that is not among the {vertices} vertices");
+            Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, message))
+        }
+    }
+}

@@ -23,7 +23,7 @@
 //! ```
 //! use std::ops::ControlFlow;
 //! use stereology_anneal::{PackOptions, box_for_fraction, lognormal_sizes, mix, pack, populate};
-//! use stereology_shape::{Arrangement, Body, UnitBody};
+//! use stereology_anneal::shape::{Arrangement, Body, UnitBody};
 //!
 //! let bodies = [UnitBody::new(&Body::sphere(1.0)?)];
 //! let grains = mix(&lognormal_sizes(1000, 0.3, 0)?, &[1.0], 0)?;
@@ -37,9 +37,9 @@
 //! Check whether the particles of another program overlap:
 //!
 //! ```
-//! use nalgebra::{Point3, UnitQuaternion, Vector3};
 //! use stereology_anneal::Packing;
-//! use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
+//! use stereology_anneal::nalgebra::{Point3, UnitQuaternion, Vector3};
+//! use stereology_anneal::shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 //!
 //! let cube = UnitBody::new(&Body::cuboid([1.0, 1.0, 1.0])?);
 //! let size = cube.body().size(); // edge length 1
@@ -78,6 +78,11 @@ mod section_test;
 mod separating_axis;
 mod sequential;
 mod surfaces;
+
+/// The linear algebra of points, vectors and rotations in this crate's signatures.
+pub use nalgebra;
+/// The bodies and particles that are packed.
+pub use stereology_shape as shape;
 
 pub use certificate::{Certificate, Overlap, Overlaps, Packing, overlaps};
 pub use convex_parts::ConvexParts;

@@ -16,7 +16,7 @@
 //!
 //! ```
 //! use stereology_kmatrix::{SectionLaw, SectionOptions, Sizes};
-//! use stereology_shape::Body;
+//! use stereology_kmatrix::shape::Body;
 //!
 //! let law = SectionLaw::of_body(&Body::rock(7), &SectionOptions::default().with_directions(1024))?;
 //! let edges: Vec<f64> = (0..=10).map(f64::from).collect();
@@ -29,7 +29,7 @@
 //!
 //! ```
 //! use stereology_kmatrix::{SectionLaw, SectionOptions};
-//! use stereology_shape::{Body, ClosedMesh, TriangleMesh};
+//! use stereology_kmatrix::shape::{Body, ClosedMesh, TriangleMesh};
 //!
 //! let torus = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.5, 32, 16))?;
 //! let law = SectionLaw::of_body(&Body::from_mesh(torus), &SectionOptions::default().with_directions(256))?;
@@ -60,6 +60,11 @@ mod saltikov;
 mod sample;
 mod section_law;
 mod sweep;
+
+/// The linear algebra of matrices and vectors in this crate's signatures.
+pub use nalgebra;
+/// The bodies whose kernels these are.
+pub use stereology_shape as shape;
 
 pub use exact::{Effort, SectionLawError, SectionOptions};
 pub use kernel::{Counting, Sizes};

@@ -1,7 +1,6 @@
 //! How neighbouring voxels of a colour volume that repeats hang together.
 
-#![allow(clippy::cast_possible_truncation, reason = "colours are f32")]
-
+use crate::narrow::single;
 use rayon::prelude::*;
 
 /// A step from a voxel to a neighbour along x, y, z, and where its products count: at index a + 2b + 4c for lag (±a, ±b, ±c). A step and its opposite are the same; of all others one is here.
@@ -31,10 +30,7 @@ pub(crate) fn mean_and_autocovariance(samples: &[f32], [nx, ny, nz]: [usize; 3])
         .into_par_iter()
         .map(|z| plane(z).chunks_exact(of_row).map(sum).fold([0.0; 3], plus))
         .collect();
-    let mean = sums
-        .into_iter()
-        .fold([0.0; 3], plus)
-        .map(|sum| (sum * per_voxel) as f32);
+    let mean = sums.into_iter().fold([0.0; 3], plus).map(|sum| single(sum * per_voxel));
     // Differences before products: of values far from zero the difference of mean products would have no digits left.
     let centred = |z: usize| -> Vec<f32> {
         let voxels = plane(z).as_chunks::<3>().0.iter();
@@ -59,12 +55,12 @@ pub(crate) fn mean_and_autocovariance(samples: &[f32], [nx, ny, nz]: [usize; 3])
         let sum = planes.iter().map(|sums| sums[step]).fold([0.0; 3], plus);
         covariance[*index] = plus(covariance[*index], sum.map(|sum| sum * per_voxel / signs));
     }
-    (mean, covariance.map(|rgb| rgb.map(|c| c as f32)))
+    (mean, covariance.map(|rgb| rgb.map(single)))
 }
 
 /// 0, 1 or, for −1, 2.
 fn usize_of(step: i8) -> usize {
-    step.rem_euclid(3) as usize
+    usize::from(step.rem_euclid(3).unsigned_abs())
 }
 
 /// Sums of the channels of a row.
@@ -111,7 +107,7 @@ mod tests {
             let [nx, ny, nz] = sizes;
             let at = |x: usize, y: usize, z: usize, c: usize| {
                 let number = (((z % nz) * ny + y % ny) * nx + x % nx) * 3 + c;
-                offset + ((number as u32 + seed).wrapping_mul(2_654_435_761) >> 8) as f32 / 1e7
+                offset + ((u32::try_from(number).unwrap() + seed).wrapping_mul(2_654_435_761) >> 8) as f32 / 1e7
             };
             let voxels: Vec<[usize; 3]> = (0..nx * ny * nz).map(|i| [i % nx, i / nx % ny, i / nx / ny]).collect();
             let samples: Vec<f32> = voxels.iter().flat_map(|&[x, y, z]| [0, 1, 2].map(|c| at(x, y, z, c))).collect();

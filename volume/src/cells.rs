@@ -1,11 +1,7 @@
 //! Which particles can be at a point: the periodic box cut into cells, each with the particle images that reach into it.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "cells are fewer than 2^27, particles and their places checked by Solid::new"
-)]
-
 use crate::images::{Image, Images, NONE};
+use crate::narrow::{floor, modulo, number, whole};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
@@ -55,7 +51,7 @@ impl Cells {
     pub(crate) fn new(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Self {
         let sides = period.sides();
         let wanted = (CELLS_PER_PARTICLE * particles.len().max(1) as f64 / period.volume()).cbrt();
-        let counts = [0, 1, 2].map(|k| (sides[k] * wanted).ceil().clamp(1.0, MOST_CELLS_PER_SIDE) as usize);
+        let counts = [0, 1, 2].map(|k| whole((sides[k] * wanted).ceil().clamp(1.0, MOST_CELLS_PER_SIDE)));
         let cells_per_length = Vector3::from_fn(|k, _| counts[k] as f64 / sides[k]);
         let placed: Vec<Placed> = particles
             .iter()
@@ -89,7 +85,7 @@ impl Cells {
         let half_diagonal = size.norm() * (0.5 + SLACK);
         let range = |k: usize| {
             let reach = placed.outer + SLACK * size[k];
-            let cell = |x: f64| (x * self.cells_per_length[k]).floor() as i64;
+            let cell = |x: f64| floor(x * self.cells_per_length[k]);
             cell(centre[k] - reach)..=cell(centre[k] + reach)
         };
         let mut reached = Vec::new();
@@ -117,9 +113,9 @@ impl Cells {
                         }
                     };
                     let turns = Vector3::from_fn(|a, _| index_along[a].div_euclid(self.counts[a] as i64) as f64);
-                    let cell = [0, 1, 2].map(|a| index_along[a].rem_euclid(self.counts[a] as i64) as usize);
-                    let image = Image::new(centre - turns.component_mul(&self.sides), placed.outer, index as u32);
-                    reached.push((self.number(cell) as u32, cover, image));
+                    let cell = [0, 1, 2].map(|a| modulo(index_along[a], self.counts[a]));
+                    let image = Image::new(centre - turns.component_mul(&self.sides), placed.outer, number(index));
+                    reached.push((number(self.number(cell)), cover, image));
                 }
             }
         }
@@ -152,7 +148,7 @@ impl Cells {
     }
 
     fn cell_of(&self, p: &Point3<f64>) -> [usize; 3] {
-        [0, 1, 2].map(|k| ((p[k] * self.cells_per_length[k]) as usize).min(self.counts[k] - 1))
+        [0, 1, 2].map(|k| whole(p[k] * self.cells_per_length[k]).min(self.counts[k] - 1))
     }
 
     fn images_in(&self, cell: usize) -> &[Image] {
@@ -220,7 +216,7 @@ impl Cells {
             for_ring(ring, |step| {
                 let raw = [0, 1, 2].map(|k| home[k] as i64 + i64::from(step[k]));
                 let turns = Vector3::from_fn(|k, _| raw[k].div_euclid(self.counts[k] as i64) as f64);
-                let cell = [0, 1, 2].map(|k| raw[k].rem_euclid(self.counts[k] as i64) as usize);
+                let cell = [0, 1, 2].map(|k| modulo(raw[k], self.counts[k]));
                 let shift = turns.component_mul(&self.sides);
                 for image in self.images_in(self.number(cell)) {
                     let offset = p - (image.centre + shift);

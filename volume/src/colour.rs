@@ -1,11 +1,6 @@
 //! Colours added up, and made bytes.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the range of u8"
-)]
-
+use crate::narrow::byte;
 use wide::{f32x4, f32x8, i16x8, u8x16};
 
 /// Three channels and a fourth of no account, so that they are worked out at once.
@@ -50,7 +45,7 @@ const HALF: f32 = 0.5_f32.next_down();
 
 /// The only place where colours are clamped: encoded values to bytes, halves rounded up; what is no number becomes 0.
 pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
-    colour.map(|value| (value * 255.0 + HALF) as u8)
+    colour.map(|value| byte(value * 255.0 + HALF))
 }
 
 /// [`to_bytes`] of the channels of many points.
@@ -86,7 +81,8 @@ mod tests {
         let mut bytes = vec![1; values.len()];
         row_to_bytes(&values, &mut bytes);
         for (value, byte) in values.into_iter().zip(bytes) {
-            let expected = (value * 255.0 + 0.0).clamp(0.0, 255.0).round() as u8;
+            let expected = (value * 255.0 + 0.0).clamp(0.0, 255.0).round();
+            let expected = super::byte(expected);
             assert_eq!(to_bytes([value; 3]), [expected; 3], "{value}");
             assert_eq!(byte, expected, "{value}");
         }

@@ -1,5 +1,6 @@
 //! The periodic images of the particles, sorted by height.
 
+use crate::narrow::floor;
 use nalgebra::Point3;
 use stereology_shape::{Particle, PeriodicBox};
 
@@ -43,9 +44,9 @@ impl Images {
             let (home, radius) = (period.wrap(&particle.position), outer(index as usize));
             reach = reach.max(radius);
             let along = |k: usize| {
-                let turns = (radius / sides[k]).ceil() as i32;
+                let turns = floor((radius / sides[k]).ceil());
                 (-turns..=turns)
-                    .map(move |turn| home[k] + f64::from(turn) * sides[k])
+                    .map(move |turn| home[k] + turn as f64 * sides[k])
                     .filter(move |x| x + radius > 0.0 && x - radius < sides[k])
             };
             for z in along(2) {

@@ -65,6 +65,7 @@ mod cells;
 mod charts;
 mod colour;
 mod images;
+mod narrow;
 mod residual;
 mod residual_row;
 mod row;

@@ -1,12 +1,8 @@
 //! What is left of a photograph without its mean colours, as a volume that repeats; looked up between its voxels.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "colours are f32; places are in the box and positive"
-)]
-
 use crate::autocovariance::mean_and_autocovariance;
 use crate::colour::{Lanes, lanes};
+use crate::narrow::{single, whole};
 use nalgebra::{Point3, Vector3};
 use ndarray::Array4;
 
@@ -123,7 +119,7 @@ impl Field {
     pub(crate) fn between(&self, axis: usize, x: f64, lookup: Lookup) -> Between {
         let n = self.sizes[axis];
         if lookup == Lookup::Nearest {
-            let voxel = (x * self.voxels_per_length[axis]) as usize % n;
+            let voxel = whole(x * self.voxels_per_length[axis]) % n;
             return Between {
                 low: voxel,
                 high: voxel,
@@ -132,7 +128,7 @@ impl Field {
         }
         // Half a voxel off the centres, and a whole period on, so that it is positive.
         let place = x * self.voxels_per_length[axis] - 0.5 + n as f64;
-        let (mut floor, mut share) = (place as usize, place.fract());
+        let (mut floor, mut share) = (whole(place), place.fract());
         // At a voxel to rounding is at the voxel.
         if share < AT_VOXEL {
             share = 0.0;
@@ -143,7 +139,7 @@ impl Field {
         Between {
             low,
             high: if low + 1 == n { 0 } else { low + 1 },
-            share: share as f32,
+            share: single(share),
         }
     }
 }

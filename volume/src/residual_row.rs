@@ -1,11 +1,7 @@
 //! The residual along rows of points: what is worked out for a voxel, or for a place between two, is so once.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "a row has fewer than 2^32 points and voxels"
-)]
-
 use crate::colour::{Lanes, fill_with_detail, lanes};
+use crate::narrow::number;
 use crate::residual::{Between, Field, FieldRow, Lookup, Weights};
 use std::ops::Range;
 
@@ -64,11 +60,11 @@ impl Field {
         let mut shares: Vec<f32> = between.iter().map(|place| place.share).collect();
         shares.sort_unstable_by(f32::total_cmp);
         shares.dedup();
-        let sample = |v: usize| 3 * voxels.partition_point(|voxel| *voxel < v) as u32;
+        let sample = |v: usize| 3 * number(voxels.partition_point(|voxel| *voxel < v));
         let place = |of: &Between| Place {
             low: sample(of.low),
             high: sample(of.high),
-            share: shares.partition_point(|share| *share < of.share) as u32,
+            share: number(shares.partition_point(|share| *share < of.share)),
         };
         Places {
             places: between.iter().map(place).collect(),

@@ -1,10 +1,6 @@
 //! Points on a line along x, as voxels lie: what is the same for all of them is worked out once.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "numbers of points, held between 0 and all"
-)]
-
+use crate::narrow::whole_u32;
 use std::ops::Range;
 
 /// How near to the end of a chord, in steps, a point is asked by itself: far more than rounding.
@@ -39,7 +35,7 @@ impl Row {
     /// Of the first `n` points, those at x between the two `possible` ones, and of them those surely between the two `sure` ones; either may be empty.
     pub(crate) fn between(&self, possible: [f64; 2], sure: [f64; 2], n: u32) -> [Range<u32>; 2] {
         // How many points lie before: one more than the whole number below.
-        let before = |x: f64, slack: f64| (((x - self.shift) * self.per_step + (0.5 + slack)) as u32).min(n);
+        let before = |x: f64, slack: f64| whole_u32((x - self.shift) * self.per_step + (0.5 + slack)).min(n);
         let (from, end) = (before(possible[0], -SLACK), before(possible[1], SLACK));
         let end = end.max(from);
         let first = before(sure[0], SLACK).clamp(from, end);

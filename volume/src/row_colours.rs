@@ -1,11 +1,7 @@
 //! The colours of the points of a row.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "numbers of points, held between 0 and all"
-)]
-
 use crate::colour::fill_plain;
+use crate::narrow::number;
 use crate::residual::Field;
 use crate::residual_row::{Details, Places, SPARE_POINTS};
 use crate::row::Row;
@@ -32,7 +28,7 @@ impl RowColours {
 impl Solid {
     /// Where the points of a row lie in the residuals of binder and particles: the same for all rows of one step and shift.
     pub(crate) fn places_along(&self, row: &Row, points: usize) -> Option<[Places; 2]> {
-        let places = |field: &Field| field.places((0..points as u32).map(|i| row.x(i)), self.lookup());
+        let places = |field: &Field| field.places((0..number(points)).map(|i| row.x(i)), self.lookup());
         self.fields().map(|fields| fields.map(places))
     }
 

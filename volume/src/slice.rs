@@ -1,11 +1,7 @@
 //! Pictures of plane sections.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "ids are checked against 2^31 by Solid::new; sample counts are clamped"
-)]
-
 use crate::colour::{add, to_bytes};
+use crate::narrow::{number, whole_u32};
 use crate::sections::Axis;
 use crate::solid::Solid;
 use crate::solid_error::SolidError;
@@ -163,7 +159,7 @@ impl Solid {
         ids.par_chunks_mut(width as usize).enumerate().for_each(|(row, ids)| {
             for (column, id) in ids.iter_mut().enumerate() {
                 let p = plane.point((column as f64 + 0.5) * pixel, (row as f64 + 0.5) * pixel);
-                *id = self.id_at(&p).map_or(0, |id| id as u32 + 1);
+                *id = self.id_at(&p).map_or(0, |id| number(id) + 1);
             }
         });
         let ids = Array2::from_shape_vec((height as usize, width as usize), ids);
@@ -197,7 +193,7 @@ impl Solid {
         let Some(voxel) = self.residual_voxel() else {
             return mean;
         };
-        let n = (pixel / voxel).round().clamp(1.0, MOST_RESIDUAL_SAMPLES) as u32;
+        let n = whole_u32((pixel / voxel).round().clamp(1.0, MOST_RESIDUAL_SAMPLES));
         let residual = |in_particle: bool| average(places(n).map(|p| (self.residual_within(&p, in_particle), 0.0))).0;
         let mut colour = mean;
         for (in_particle, share) in [(true, particle_share), (false, 1.0 - particle_share)] {

@@ -1,12 +1,8 @@
 //! Which particle each point of a row is in: the chords of the particles that the row meets cut it into runs.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "a row has fewer than 2^32 points; images of a particle are few"
-)]
-
 use crate::cells::Cells;
 use crate::images::{Image, NONE};
+use crate::narrow::number;
 use crate::row::Row;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -112,7 +108,7 @@ impl Runs {
     /// For rows of so many points.
     pub(crate) fn new(points: usize) -> Self {
         Self {
-            points: points as u32,
+            points: number(points),
             runs: Vec::new(),
             spans: Vec::new(),
             ids: Vec::new(),
@@ -178,7 +174,7 @@ impl Runs {
         self.runs.clear();
         let mut end = 0;
         for same in self.ids.chunk_by(|a, b| a == b) {
-            end += same.len() as u32;
+            end += number(same.len());
             self.runs.push(Run { end, id: same[0] });
         }
     }

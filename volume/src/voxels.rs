@@ -1,11 +1,7 @@
 //! One period of the solid as voxels, in memory or in files.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    reason = "ids are checked against 2^31 by Solid::new; distances are stored as f32"
-)]
-
 use crate::colour::row_to_bytes;
+use crate::narrow::{number, single, whole};
 use crate::row::Row;
 use crate::row_colours::RowColours;
 use crate::solid::Solid;
@@ -120,7 +116,7 @@ impl Solid {
             if share >= 1.0 {
                 along_longest.max(1)
             } else {
-                (share * along_longest as f64).round().max(1.0) as usize
+                whole((share * along_longest as f64).round().max(1.0))
             }
         });
         VoxelGrid {
@@ -184,7 +180,7 @@ impl Solid {
     /// If the slab has not the shape of `grid`.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
         let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
-        fill_by_id(grid, z, slab, strip, |id| id.map_or(0, |id| id as u32 + 1));
+        fill_by_id(grid, z, slab, strip, |id| id.map_or(0, |id| number(id) + 1));
     }
 
     /// Fills the slab at `z` with categories: 0 in the binder, else category + 1.
@@ -208,7 +204,7 @@ impl Solid {
         by_strips(grid, 1, &mut slab, |first, rows| {
             for (y, row) in (first..).zip(rows) {
                 for (x, voxel) in row.iter_mut().enumerate() {
-                    *voxel = self.distance_at(&grid.centre([x, y, z])) as f32;
+                    *voxel = single(self.distance_at(&grid.centre([x, y, z])));
                 }
             }
         });

@@ -8,7 +8,7 @@ use crate::particle::Particle;
 use crate::periodic_box::PeriodicBox;
 use crate::unit_body::UnitBody;
 
-/// Particles are numbered with 32 bits, their neighbours and images with them.
+/// Particles, their neighbours and their periodic images are numbered with 32 bits.
 const MOST_PARTICLES: usize = 100_000_000;
 /// A particle may be this many times as long as the shortest side of the box.
 const LONGEST: f64 = 4.0;
@@ -17,9 +17,10 @@ const NORM_TOLERANCE: f64 = 1e-9;
 
 /// Particles in a periodic box: the bodies they are copies of, the particles, and the box.
 ///
-/// Every particle is checked by [`Arrangement::new`]: its body exists, its size is a positive length, its position and its orientation are finite, the
-/// orientation is a rotation, and it is not far longer than the box. Whoever takes an arrangement can rely on that. Particles may overlap, and positions may
-/// lie outside the box. Clones share their data.
+/// Every particle is checked by [`Arrangement::new`]: its body exists, its size is a positive length, its position and
+/// its orientation are finite, the orientation is a rotation, and it is not far longer than the box. Functions that
+/// take an arrangement rely on that. Particles may overlap, and positions may lie outside the box. Clones share their
+/// data.
 ///
 /// # Examples
 ///

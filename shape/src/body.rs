@@ -1,4 +1,4 @@
-//! The bodies particles are made of, whatever describes them: a closed form or a mesh.
+//! Bodies of particles: closed forms and meshes.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::query::elliptic::{self, carlson_rg};
 use crate::section::largest_section::largest_section_area;
 use crate::section::slicer::Slicer;
 
-/// A solid body in its own unit of length and its own place, measured once.
+/// A solid body in its own unit of length and position. It is measured once.
 ///
 /// # Examples
 ///
@@ -45,7 +45,7 @@ enum Form {
     Mesh(Arc<ClosedMesh>),
 }
 
-/// What describes a body, for those who have a closed form for it.
+/// The description of a body, for code that has a closed form for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BodyKind<'a> {
@@ -63,7 +63,7 @@ pub enum BodyKind<'a> {
     Mesh(&'a ClosedMesh),
 }
 
-/// Why there is no such body.
+/// Why a body cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
@@ -134,9 +134,9 @@ pub enum BodyError {
     File(#[from] crate::file::mesh_file_error::MeshFileError),
 }
 
-/// Sides of the prism that stands for a cylinder.
+/// Sides of the prism that approximates a cylinder.
 const CYLINDER_SIDES: u32 = 128;
-/// Steps of the surface of a control-point sphere for each of its arcs.
+/// Steps per arc of the surface of a control-point sphere.
 #[cfg(feature = "io")]
 const CONTROL_STEPS: u32 = 16;
 
@@ -177,7 +177,7 @@ impl Body {
             check_length("semi-axis", axis)?;
         }
         let axes = Vector3::from(semi_axes);
-        // Division by the smallest, not the product of the two largest found by sorting: the same, shorter.
+        // The product of the two largest axes is the product of all over the smallest.
         let largest_section_area = PI * (axes.product() / axes.min());
         Ok(Self {
             form: Form::Ellipsoid { axes },
@@ -238,8 +238,9 @@ impl Body {
         Self::from_mesh(rock::rock(seed))
     }
 
-    /// The rock of the same seed with a rough surface, 5,120 triangles: radii times exp(`amplitude` g), where g is a random sum of
-    /// spherical harmonics of degrees 3 to 20, self-affine, of mean square 1. Amplitudes of 0.02 (worn) to 0.1 (jagged) look like stone.
+    /// The rock of the same seed with a rough surface, 5,120 triangles: radii times exp(`amplitude` g), where g is a
+    /// random sum of spherical harmonics of degrees 3 to 20, self-affine, of mean square 1. Amplitudes of 0.02 (worn)
+    /// to 0.1 (jagged) look like stone.
     ///
     /// # Errors
     ///
@@ -258,9 +259,9 @@ impl Body {
         Ok(Self::from_mesh(rock::rough_rock(seed, amplitude)?))
     }
 
-    /// A superellipsoid about the origin with these **semi**-axes along x, y, z and exponents (north-south, east-west): near 0 a box, 1 an
-    /// ellipsoid, 2 an octahedron, beyond a star. A mesh of up to 5,120 (stars: 8,192) triangles with its vertices on the
-    /// surface.
+    /// A superellipsoid about the origin with these **semi**-axes along x, y, z and exponents (north-south, east-west):
+    /// near 0 a box, 1 an ellipsoid, 2 an octahedron, above 2 a star. A mesh of up to 5,120 (stars: 8,192) triangles
+    /// with its vertices on the surface.
     ///
     /// # Errors
     ///
@@ -287,7 +288,7 @@ impl Body {
     ///
     /// # Errors
     ///
-    /// [`BodyError::Hull`] if they have none with a volume.
+    /// [`BodyError::Hull`] if their hull has no volume.
     pub fn hull(points: &[Point3<f64>]) -> Result<Self, BodyError> {
         Ok(Self::from_mesh(convex_hull(points)?))
     }
@@ -309,13 +310,14 @@ impl Body {
         }
     }
 
-    /// Reads a body from its description: `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full edges), `cylinder:D,L`,
-    /// `rock:SEED` or `rock:SEED,ROUGHNESS`, `superellipsoid:A,B,C,E1,E2` (semi-axes, exponents), and with feature `io` `hull:FILE` (of
-    /// [points](crate::read_points): the vertices of a mesh file, or rows of x, y, z) or the name of a mesh file or of a control-point sphere (.json).
+    /// Reads a body from its description: `sphere` (diameter 1), `ellipsoid:A,B,C` (semi-axes), `box:A,B,C` (full
+    /// edges), `cylinder:D,L`, `rock:SEED` or `rock:SEED,ROUGHNESS`, `superellipsoid:A,B,C,E1,E2` (semi-axes,
+    /// exponents), and with feature `io` `hull:FILE` (of [points](crate::read_points): the vertices of a mesh file, or
+    /// rows of x, y, z) or the name of a mesh file or of a control-point sphere (.json).
     ///
     /// # Errors
     ///
-    /// [`BodyError`]: what is wrong with the words, the numbers, the file or its mesh, and where.
+    /// [`BodyError`] states what is wrong with the words, the numbers, the file or its mesh, and where.
     ///
     /// ```
     /// # use stereology_shape::Body;
@@ -327,7 +329,7 @@ impl Body {
         Self::parse_welding(spec, 0.0)
     }
 
-    /// [`parse`](Self::parse), where vertices of a mesh file nearer than `weld` to each other are joined first.
+    /// Like [`parse`](Self::parse), but vertices of a mesh file nearer than `weld` to each other are joined first.
     ///
     /// # Errors
     ///
@@ -417,7 +419,7 @@ impl Body {
         Err(BodyError::UnknownShape { spec: spec.to_owned() })
     }
 
-    /// What describes the body.
+    /// The closed form or the mesh.
     #[must_use]
     pub fn kind(&self) -> BodyKind<'_> {
         match &self.form {
@@ -429,7 +431,7 @@ impl Body {
         }
     }
 
-    /// The mesh of a body that is one.
+    /// The mesh, if the body is a mesh.
     #[must_use]
     pub fn mesh(&self) -> Option<&ClosedMesh> {
         match &self.form {
@@ -438,7 +440,8 @@ impl Body {
         }
     }
 
-    /// Triangles for drawing or writing: the mesh itself, or an icosphere of `20 · 4^subdivisions` triangles stretched to the closed form.
+    /// Triangles for drawing or writing: the mesh itself, or an icosphere of `20 · 4^subdivisions` triangles scaled to
+    /// the closed form.
     ///
     /// ```
     /// # use stereology_shape::Body;
@@ -472,7 +475,7 @@ impl Body {
         match &self.form {
             Form::Sphere { diameter } => PI * diameter * diameter,
             Form::Ellipsoid { axes } => {
-                // In units of the largest axis: fourth powers stay in range.
+                // In units of the largest axis, so that fourth powers stay in range.
                 let unit = axes.max();
                 let [a, b, c]: [f64; 3] = (axes / unit).component_mul(&(axes / unit)).into();
                 4.0 * PI * unit * unit * carlson_rg(a * b, a * c, b * c)
@@ -481,7 +484,8 @@ impl Body {
         }
     }
 
-    /// Mean width (mean caliper diameter) of the hull: hits by random planes per unit of plane distance. Ellipsoids: 2 R_G(a², b², c²).
+    /// Mean width (mean caliper diameter) of the convex hull: the number of parallel planes of unit spacing that meet
+    /// it, averaged over directions and offsets. Ellipsoids: 2 R_G(a², b², c²).
     #[must_use]
     pub fn mean_width(&self) -> f64 {
         match &self.form {
@@ -495,7 +499,8 @@ impl Body {
         }
     }
 
-    /// Profiles less holes of random sections per unit of plane distance; equal to the mean width of a convex body.
+    /// The mean of profiles minus holes over random planes, per plane spacing; equal to the mean width for a convex
+    /// body.
     #[must_use]
     pub fn signed_mean_width(&self) -> f64 {
         self.mesh()
@@ -508,20 +513,20 @@ impl Body {
         self.mesh().map_or_else(Point3::origin, ClosedMesh::centroid)
     }
 
-    /// Whether the body is convex; then a section is one profile without holes.
+    /// Whether the body is convex. A section of a convex body is one profile without holes.
     #[must_use]
     pub fn is_convex(&self) -> bool {
         self.mesh().is_none_or(ClosedMesh::is_convex)
     }
 
-    /// Area of the largest single profile any plane cuts: exact for sphere and ellipsoid, of meshes found by maximisation over
-    /// directions and depths (deterministic; never larger than a section that exists).
+    /// Area of the largest single profile of any plane section: exact for spheres and ellipsoids, found by maximisation
+    /// over directions and depths for meshes (deterministic; never larger than an existing section).
     #[must_use]
     pub fn largest_section_area(&self) -> f64 {
         self.largest_section_area
     }
 
-    /// Diameter of the circle with the area of the largest profile, √(4 A / π): what `size` means everywhere.
+    /// Equivalent circular diameter of the largest profile, √(4 A / π). `size` has this meaning everywhere.
     #[must_use]
     pub fn size(&self) -> f64 {
         match &self.form {
@@ -530,7 +535,8 @@ impl Body {
         }
     }
 
-    /// Areas of the disjoint profiles of the section by the plane n·x = `offset`, holes subtracted; empty where the plane misses.
+    /// Areas of the disjoint profiles of the section by the plane n·x = `offset`, holes subtracted; empty if the plane
+    /// misses the body.
     ///
     /// ```
     /// # use nalgebra::Vector3;

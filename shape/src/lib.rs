@@ -1,19 +1,22 @@
-//! Bodies of particles: what they measure, what planes cut from them, where they are.
+//! Particle shapes: measures, plane sections, queries and positions in a periodic box.
 //!
-//! A body is a closed triangle mesh, a sphere or an ellipsoid. Stereology asks few things of it, all answered here:
+//! A body is a closed triangle mesh, a sphere or an ellipsoid. This crate computes what stereology needs of it:
 //!
-//! - volume V, surface S and the mean width H = (1/4π) Σ edge length × angle: planes hit particles of number density N_V with N_A = H N_V;
-//! - its `size`: the diameter of the circle with the area A of its largest section, √(4 A / π), found by maximisation;
-//! - the profiles of a section: disjoint outlines with their holes, because one particle may show several;
-//! - as a [`UnitBody`] (centroid at the origin, size 1): inside, support, signed distance, in nanoseconds;
-//! - as a [`Particle`]: scaled, turned and moved, world = position + size · R u, in a [`PeriodicBox`]; an [`Arrangement`] holds particles that were checked.
+//! - volume V, surface S and the mean width H = (1/4π) Σ edge length × angle: a plane cuts N_A = H N_V particles per
+//!   unit area, where N_V is their number per unit volume;
+//! - its `size`: the equivalent circular diameter √(4 A / π) of its largest section of area A, found by maximisation;
+//! - the profiles of a section: disjoint outlines with their holes; a section of one particle may have several;
+//! - as a [`UnitBody`] (centroid at the origin, size 1): point tests, support points and signed distances in
+//!   nanoseconds;
+//! - as a [`Particle`]: scaled, rotated and moved, world = position + size · R u, in a [`PeriodicBox`]. An
+//!   [`Arrangement`] holds particles that have been checked.
 //!
-//! Decisions that rounding could spoil (which side of a plane, inside or outside) are exact signs of determinants; measures are sums in
-//! double precision. Nothing is mended in silence: [`ClosedMesh::repairs`] lists it.
+//! Decisions that rounding could change (which side of a plane, inside or outside) use exact signs of determinants.
+//! Measures are sums in double precision. [`ClosedMesh::repairs`] lists every repair of a mesh.
 //!
 //! # Examples
 //!
-//! What is the mean caliper diameter of a brick, and how large is it in a photograph at most?
+//! What are the mean caliper diameter of a brick and the size of its largest section?
 //!
 //! ```
 //! use stereology_shape::Body;
@@ -24,7 +27,7 @@
 //! # Ok::<(), stereology_shape::BodyError>(())
 //! ```
 //!
-//! Is a point of a material inside this turned rock?
+//! Is a point of a material inside this rotated rock?
 //!
 //! ```
 //! use nalgebra::Point3;

@@ -1,10 +1,11 @@
-//! A particle: which body, how large, where and how turned.
+//! A particle: its body, size, position and orientation.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
-/// One particle of a material: a [`UnitBody`](crate::UnitBody) scaled by `size`, turned by `orientation` and moved to `position`.
+/// One particle of a material: a [`UnitBody`](crate::UnitBody) scaled by `size`, rotated by `orientation` and moved to
+/// `position`.
 ///
 /// # Examples
 ///
@@ -19,9 +20,9 @@ use std::f64::consts::TAU;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle {
-    /// Index of its body in the list it belongs to.
+    /// Index of its body in the list of bodies.
     pub shape: usize,
-    /// Diameter of the circle with the area of the particle's largest section.
+    /// Equivalent circular diameter of the particle's largest section.
     pub size: f64,
     /// Colour category.
     pub category: u8,
@@ -61,7 +62,7 @@ impl Particle {
     }
 }
 
-/// A rotation drawn uniformly from all rotations (Shoemake 1992); three draws.
+/// A rotation drawn uniformly from all rotations (Shoemake 1992); it takes three random numbers.
 ///
 /// ```
 /// use rand::SeedableRng;
@@ -72,10 +73,10 @@ impl Particle {
 /// assert_eq!(turn, isotropic_rotation(&mut ChaCha8Rng::seed_from_u64(7)));
 /// ```
 pub fn isotropic_rotation<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
-    let share: f64 = rng.random();
+    let part: f64 = rng.random();
     let (sin1, cos1) = (TAU * rng.random::<f64>()).sin_cos();
     let (sin2, cos2) = (TAU * rng.random::<f64>()).sin_cos();
-    let (first, second) = ((1.0 - share).sqrt(), share.sqrt());
+    let (first, second) = ((1.0 - part).sqrt(), part.sqrt());
     let q = nalgebra::Quaternion::from_parts(second * cos2, Vector3::new(first * sin1, first * cos1, second * sin2));
     UnitQuaternion::from_quaternion(q)
 }

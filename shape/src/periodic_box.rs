@@ -71,13 +71,13 @@ impl PeriodicBox {
                 return x;
             }
             let wrapped = x - side * (x / side).floor();
-            // Rounding may reach the far side from just below 0, or fall just below 0.
+            // Rounding may give the far side for a coordinate just below 0, or a value just below 0.
             if (0.0..side).contains(&wrapped) { wrapped } else { 0.0 }
         }))
     }
 
-    /// The place of a point along a Z-curve through the box (Morton 1966), 1024 steps along each side: points with near places are near to
-    /// each other.
+    /// Position of a point along a Z-curve through the box (Morton 1966), with 1024 steps along each side. Points near
+    /// each other along the curve are near each other in space.
     ///
     /// ```
     /// # use nalgebra::{Point3, Vector3};
@@ -91,7 +91,7 @@ impl PeriodicBox {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a wrapped point is in the box; what is no number goes to 0"
+        reason = "a wrapped point is in the box; NaN becomes 0"
     )]
     pub fn curve_place(&self, p: &Point3<f64>) -> u32 {
         const STEPS: f64 = 1024.0;

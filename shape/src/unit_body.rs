@@ -1,4 +1,4 @@
-//! A body in its standard place and size, prepared to be asked millions of questions.
+//! A body at the origin with size 1, prepared for fast queries.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -13,10 +13,10 @@ use crate::query::elliptic;
 use crate::query::inside::Columns;
 use crate::query::nearest::BoxTree;
 
-/// A [`Body`] moved so that its centroid is at the origin and scaled to size 1: the circle with the area of its largest section has
-/// diameter 1. What a [`Particle`](crate::Particle) turns, scales and moves.
+/// A [`Body`] moved so that its centroid is at the origin and scaled to size 1: the circle with the area of its largest
+/// section has diameter 1. A [`Particle`](crate::Particle) is such a body, scaled, rotated and moved.
 ///
-/// Clones share what was prepared.
+/// Clones share the prepared data.
 ///
 /// # Examples
 ///
@@ -66,11 +66,11 @@ enum Form {
     },
 }
 
-/// Up to here testing all half-spaces is faster than looking up a column of triangles.
+/// Up to this number of faces, testing all half-spaces is faster than looking up a column of triangles.
 const FEW_FACES: usize = 64;
 
 impl UnitBody {
-    /// Moves and scales the body, and prepares its queries. Cost for meshes: T log T.
+    /// Moves and scales the body and prepares its queries. Cost for meshes of T triangles: T log T.
     #[must_use]
     pub fn new(body: &Body) -> Self {
         let size = body.size();
@@ -105,19 +105,19 @@ impl UnitBody {
         Self { inner: Arc::new(inner) }
     }
 
-    /// The body as it was given, in its own place and size.
+    /// The body as given, in its own position and size.
     #[must_use]
     pub fn body(&self) -> &Body {
         &self.inner.body
     }
 
-    /// The mesh in unit coordinates, of a body that is one.
+    /// The mesh in unit coordinates, if the body is a mesh.
     #[must_use]
     pub fn mesh(&self) -> Option<&ClosedMesh> {
         self.inner.mesh.as_ref()
     }
 
-    /// Volume at size 1: a particle of size s has s³ times as much.
+    /// Volume at size 1; a particle of size s has s³ times this volume.
     #[must_use]
     pub fn volume(&self) -> f64 {
         self.inner.volume
@@ -135,7 +135,7 @@ impl UnitBody {
         self.body().mean_width() / self.body().size()
     }
 
-    /// Radius of the smallest ball about the centroid that holds the body.
+    /// Radius of the smallest ball about the centroid that contains the body.
     #[must_use]
     pub fn bounding_radius(&self) -> f64 {
         self.inner.bounding_radius
@@ -153,7 +153,7 @@ impl UnitBody {
         self.body().is_convex()
     }
 
-    /// A point of the (hull of the) body farthest in a direction of any length but 0.
+    /// A point of the body's convex hull farthest in a direction of any length except 0.
     #[must_use]
     pub fn support(&self, direction: &Vector3<f64>) -> Point3<f64> {
         match &self.inner.form {
@@ -166,15 +166,18 @@ impl UnitBody {
         }
     }
 
-    /// Whether a point is inside; points of the surface itself may be either.
+    /// Whether a point is inside; points on the surface may count as either.
     #[must_use]
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         self.inner.contains(p)
     }
 
-    /// Where the lines `origin + s across + t along` of a plane are inside: to rounding for balls, ellipsoids and convex bodies of few faces; for others between the largest ball in the body and the smallest around it.
+    /// The chords of the lines `origin + s across + t along` of a plane: exact to rounding for balls, ellipsoids and
+    /// convex bodies with few faces; for other bodies bounded by the largest ball in the body and the smallest ball
+    /// around it.
     ///
-    /// Cost: a square root a face, then one product a line and face that the plane meets. A zero `along` has no chord to speak of.
+    /// Cost: one square root per face, then one product per line and face that the plane meets. A zero `along` gives
+    /// meaningless chords.
     ///
     /// ```
     /// use nalgebra::{Point3, Vector3};
@@ -205,15 +208,16 @@ impl UnitBody {
         }
     }
 
-    /// Distance to the surface, negative inside; true distances (ellipsoid: to about 1e-12).
+    /// Euclidean distance to the surface, negative inside (for ellipsoids to about 1e-12).
     #[must_use]
     pub fn signed_distance(&self, p: &Point3<f64>) -> f64 {
         self.inner.signed_distance(p)
     }
 
-    /// What [`Self::signed_distance`] is at least: the same inside, in a fraction of its time outside.
+    /// Lower bound of [`Self::signed_distance`]: equal to it inside the body, and much faster outside.
     ///
-    /// Outside a convex body it is the height above a plane that the body lies below, which is nearly the distance where that plane is well chosen.
+    /// Outside a convex body it is the height above a plane that has the body on its other side, which is nearly the
+    /// distance if that plane is well chosen.
     ///
     /// ```
     /// use nalgebra::Point3;
@@ -239,7 +243,7 @@ impl UnitBody {
                 if highest <= 0.0 {
                     return highest;
                 }
-                // Beyond an edge or a corner, across the mean of its faces.
+                // Beyond an edge or a corner, in the direction of the mean of its faces' normals.
                 let normal = outward.normalize();
                 highest.max(normal.dot(&(p - support.support(&normal))))
             }
@@ -248,7 +252,7 @@ impl UnitBody {
                 if scaled.norm_squared() < 1.0 {
                     return self.signed_distance(p);
                 }
-                // The plane that touches it where the line from its centre to the point leaves it.
+                // The tangent plane where the line from the centre to the point leaves the body.
                 let normal = scaled.component_div(axes).normalize();
                 normal.dot(&p.coords) - elliptic::half_width(axes, &normal)
             }
@@ -294,7 +298,7 @@ fn prepare(mesh: &ClosedMesh) -> Form {
 impl Inner {
     fn contains(&self, p: &Point3<f64>) -> bool {
         let square = p.coords.norm_squared();
-        // The balls about the centroid settle most questions.
+        // The balls about the centroid decide most cases.
         if square >= self.bounding_radius * self.bounding_radius {
             return false;
         }
@@ -312,7 +316,8 @@ impl Inner {
             Form::Sphere => p.coords.norm() - 0.5,
             Form::Ellipsoid { axes } => elliptic::signed_distance(axes, p),
             Form::Polytope { half_spaces, tree, .. } => {
-                // Inside a convex body the nearest point lies on the nearest face's plane; outside it may be an edge.
+                // Inside a convex body the nearest surface point lies on the nearest face's plane; outside it may be on
+                // an edge.
                 let highest = highest(half_spaces, p);
                 if highest <= 0.0 { highest } else { tree.distance(p) }
             }

@@ -1,4 +1,4 @@
-//! A mesh of few triangles with the solid's texture in a picture: a baked atlas.
+//! Baking: the solid's colours on a mesh of few triangles as a texture atlas.
 
 use crate::carve_error::{CarveError, MOST_PIXELS, check};
 use crate::charts::{Chart, Layout, MARGIN, Rectangle, charts, least_side};
@@ -9,12 +9,12 @@ use rayon::prelude::*;
 use stereology_metrics::Progress;
 use stereology_shape::{Texture, TexturedMesh, TriangleMesh, corner_normals};
 
-/// How an atlas is baked.
+/// Baking options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BakeOptions {
-    /// Side of the square picture in texels: 1 to 16384.
+    /// Side of the square texture in texels: 1 to 16384.
     pub pixels: u32,
-    /// A texel is the mean of n × n points of the solid; 1 to 16, nearer ones are taken for others.
+    /// A texel is the mean of n × n points of the solid; values are limited to 1 to 16.
     pub samples: u32,
 }
 
@@ -31,15 +31,16 @@ impl Default for BakeOptions {
 /// A mesh with its atlas.
 #[derive(Clone, Debug)]
 pub struct Baked {
-    /// The mesh, in the coordinates it was given in, its triangles as they were.
+    /// The mesh in its given coordinates, with its triangles unchanged.
     pub textured: TexturedMesh,
     /// Edge of a texel in the unit of the solid.
     pub texel: f64,
-    /// Edge of a texel over that of the residual's voxels: above 1, detail of the photograph is lost. `None` without residual.
+    /// Edge of a texel over that of the residual's voxels; above 1, detail of the photograph is lost. `None` without
+    /// residual.
     pub coarseness: Option<f64>,
-    /// Charts of the atlas, each one or two triangles.
+    /// Number of charts in the atlas, each of one or two triangles.
     pub charts: usize,
-    /// Share of the picture that is charts.
+    /// Fraction of the texture covered by charts.
     pub used: f64,
 }
 
@@ -47,17 +48,22 @@ pub struct Baked {
 const ROWS: u32 = 32;
 
 impl Solid {
-    /// Bakes the colours the solid has on the surface of `mesh` into one square picture, for meshes of few triangles; `place` tells where in the solid a point of the mesh is.
+    /// Bakes the colours of the solid on the surface of `mesh` into one square texture, for meshes of few triangles;
+    /// `place` maps points of the mesh to the solid.
     ///
-    /// Triangles are laid flat as they are, two that share an edge together where that saves room (greedily, the largest saving first), each in the smallest rectangle about it; rectangles stand in rows by height, as large as all fit, so a texel has the same size
-    /// everywhere. A texel is the mean of n × n points (box filter, encoded values); alpha is the share of them outside voids. Each rectangle has one texel more on every side, where its triangle's plane goes on: bilinear lookup shows no seams. In coarser mip
-    /// levels, neighbours mix; what belongs to nobody has the mean colour of the atlas. The same bytes at any number of threads.
+    /// Triangles are laid flat without distortion; two that share an edge are laid together if that saves area
+    /// (greedily, the largest saving first). Each chart gets its smallest bounding rectangle; rectangles are placed in
+    /// rows by height at the largest common scale, so all texels have the same size. A texel is the mean of n × n
+    /// points (box filter, encoded values); alpha is the fraction of them outside voids. Each rectangle has a margin of
+    /// one texel, on the continued plane of its triangle, so bilinear filtering shows no seams. In coarser mip levels
+    /// neighbouring charts mix; unused texels have the mean colour of the atlas. The bytes are the same at any number
+    /// of threads.
     ///
-    /// Cost: n² colours a texel; the memory of the picture.
+    /// Cost: n² colours per texel; the memory of the texture.
     ///
     /// # Errors
     ///
-    /// [`CarveError`]; [`CarveError::Crowded`] says how many texels would do.
+    /// [`CarveError`]; [`CarveError::Crowded`] states how many texels are needed.
     ///
     /// # Examples
     ///
@@ -71,7 +77,7 @@ impl Solid {
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
     /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
-    /// // The six faces of a cube, a third of the picture each way.
+    /// // The six faces of a cube, each a third of the texture's side.
     /// let cube = TriangleMesh::cuboid([5.0, 5.0, 5.0]);
     /// let options = BakeOptions { pixels: 96, ..BakeOptions::default() };
     /// let baked = solid.bake(&cube, &|p| *p, &options, &|_| ControlFlow::Continue(()))?;
@@ -135,7 +141,7 @@ impl Solid {
     }
 }
 
-/// Whether lengths are numbers, and not all zero.
+/// Whether lengths are finite, and not all zero.
 fn sound(charts: &[Chart]) -> bool {
     let finite = |p: &Point2<f64>| p.iter().all(|x| x.is_finite());
     let corners = || {
@@ -160,7 +166,7 @@ fn uvs(triangles: usize, charts: &[Chart], layout: &Layout, pixels: u32) -> Vec<
     uvs
 }
 
-/// What a picture is baked from.
+/// The input of a texture.
 struct Oven<'a> {
     solid: &'a Solid,
     place: &'a (dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
@@ -183,7 +189,7 @@ impl Oven<'_> {
             let sums: Vec<[u64; 4]> = rows.map(|(bytes, row)| self.row(bytes, row)).collect();
             sums.iter().for_each(|row| (0..4).for_each(|c| sum[c] += row[c]));
         }
-        // Rounded mean of what is seen.
+        // Rounded mean of the visible texels.
         let count = sum[3].max(1);
         let [r, g, b] = [0, 1, 2].map(|c| u8::try_from((sum[c] + count / 2) / count).unwrap_or(u8::MAX));
         rgba.par_chunks_mut(row_bytes).zip(0..pixels).for_each(|(bytes, row)| {
@@ -200,7 +206,7 @@ impl Oven<'_> {
         Ok(rgba)
     }
 
-    /// Bakes a row; the sums of red, green, blue of what is seen, and how many texels that is.
+    /// Bakes a row; returns the sums of red, green and blue of the visible texels, and their number.
     fn row(&self, bytes: &mut [u8], row: u32) -> [u64; 4] {
         let mut sum = [0; 4];
         for rectangle in self.layout.in_row(row) {
@@ -223,7 +229,7 @@ impl Oven<'_> {
         let place = |texel: u32, i: u32| {
             (f64::from(texel) - f64::from(MARGIN) + (f64::from(i) + 0.5) / f64::from(n)) / self.layout.scale
         };
-        // What is seen, and what is in voids: sum and number.
+        // Sum and number of the points outside and inside voids.
         let mut sums = [([0.0_f32; 3], 0_u16); 2];
         for i in 0..n * n {
             let on_mesh = self.charts[rectangle.chart].point(Point2::new(place(column, i % n), place(row, i / n)));
@@ -235,7 +241,7 @@ impl Oven<'_> {
         let [(seen, count), (hollow, holes)] = sums;
         let (sum, of) = if count > 0 { (seen, count) } else { (hollow, holes) };
         let [r, g, b] = to_bytes(sum.map(|c| c / f32::from(of)));
-        #[allow(clippy::cast_possible_truncation, reason = "a share of 255")]
+        #[allow(clippy::cast_possible_truncation, reason = "a fraction of 255")]
         let alpha = (f32::from(count) / f32::from(count + holes) * 255.0).round() as u8;
         [r, g, b, alpha]
     }

@@ -1,9 +1,10 @@
-//! How neighbouring voxels of a colour volume that repeats hang together.
+//! Autocovariance of neighbouring voxels of a periodic colour volume.
 
 use crate::narrow::single;
 use rayon::prelude::*;
 
-/// A step from a voxel to a neighbour along x, y, z, and where its products count: at index a + 2b + 4c for lag (±a, ±b, ±c). A step and its opposite are the same; of all others one is here.
+/// A step from a voxel to a neighbour along x, y, z, and the index a + 2b + 4c of its products for lag (±a, ±b, ±c). A
+/// step and its opposite are equivalent; only one of them is listed.
 const STEPS: [(usize, [i8; 3]); 14] = [
     (0, [0, 0, 0]),
     (1, [1, 0, 0]),
@@ -21,7 +22,8 @@ const STEPS: [(usize, [i8; 3]); 14] = [
     (7, [-1, -1, 1]),
 ];
 
-/// Mean and autocovariance, averaged over the signs of the lag, of each channel of samples (z, y, x, 3). Summed plane by plane in order.
+/// Mean and autocovariance, averaged over the signs of the lag, of each channel of samples (z, y, x, 3). Summed plane
+/// by plane in order.
 pub(crate) fn mean_and_autocovariance(samples: &[f32], [nx, ny, nz]: [usize; 3]) -> ([f32; 3], [[f32; 3]; 8]) {
     let of_row = 3 * nx;
     let plane = |z: usize| &samples[(z % nz) * ny * of_row..][..ny * of_row];
@@ -31,7 +33,7 @@ pub(crate) fn mean_and_autocovariance(samples: &[f32], [nx, ny, nz]: [usize; 3])
         .map(|z| plane(z).chunks_exact(of_row).map(sum).fold([0.0; 3], plus))
         .collect();
     let mean = sums.into_iter().fold([0.0; 3], plus).map(|sum| single(sum * per_voxel));
-    // Differences before products: of values far from zero the difference of mean products would have no digits left.
+    // Differences before products: for values far from zero the difference of mean products would lose all digits.
     let centred = |z: usize| -> Vec<f32> {
         let voxels = plane(z).as_chunks::<3>().0.iter();
         voxels
@@ -101,7 +103,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The mean over all voxels and both signs of every lag, on boxes of any size down to one voxel and far from zero.
+        /// The mean over all voxels and both signs of every lag, on boxes of any size down to one voxel and far from
+        /// zero.
         #[test]
         fn products_are_those_of_all_pairs(sizes in prop::array::uniform3(1_usize..7), offset in -100.0..100.0_f32, seed in 0_u32..99) {
             let [nx, ny, nz] = sizes;

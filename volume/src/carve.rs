@@ -1,4 +1,4 @@
-//! A mesh carved from the solid: the solid's colours on its surface, its triangles as fine as the texture asks.
+//! Carving: the solid's colours at the vertices of a mesh, refined to resolve the texture.
 
 use crate::carve_error::{CarveError, check};
 use crate::solid::Solid;
@@ -8,19 +8,21 @@ use std::collections::BTreeMap;
 use stereology_metrics::Progress;
 use stereology_shape::{ColouredMesh, TriangleMesh, corner_normals};
 
-/// How finely a mesh is carved.
+/// Carving options.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarveOptions {
-    /// Edges are not split below this length, in the unit of the solid; by default the voxel of its residual, or a hundredth of its shortest side.
+    /// Edges are not split below this length, in the unit of the solid; by default the voxel of its residual, or a
+    /// hundredth of its shortest side.
     pub detail: Option<f64>,
-    /// An edge is split where colours along it differ by more than this from those that its ends would give.
+    /// An edge is split if colours along it differ by more than this from the interpolation between its ends.
     pub contrast: f32,
-    /// When about so many triangles are reached, only the edges along which colours differ most are split, and no more after them.
+    /// Near this number of triangles, only the edges with the largest differences are split, and then the refinement
+    /// ends.
     pub most_triangles: usize,
 }
 
 impl Default for CarveOptions {
-    /// Edges down to a pixel of the photograph, 4 % of the range of colours, a million triangles.
+    /// Edges down to a pixel of the photograph, a contrast of 4 % of the range of colours, a million triangles.
     fn default() -> Self {
         Self {
             detail: None,
@@ -33,21 +35,23 @@ impl Default for CarveOptions {
 /// A carved mesh.
 #[derive(Clone, Debug)]
 pub struct Carved {
-    /// The mesh, in the coordinates it was given in.
+    /// The mesh in its given coordinates.
     pub coloured: ColouredMesh,
-    /// Edges of the texture that remain coarser than asked for, since there were triangles enough.
+    /// Number of edges that remain coarser than requested because the limit of triangles was reached.
     pub coarse_edges: usize,
 }
 
 impl Solid {
-    /// Gives the surface of `mesh` the colours the solid has there, where `place` tells where in the solid a point of the mesh is.
+    /// Gives the surface of `mesh` the colours of the solid; `place` maps points of the mesh to the solid.
     ///
-    /// Triangles are bisected at their longest edges (Rivara 1984), so they stay well shaped and no gaps open, until colours between the ends of each edge are what a viewer interpolates, or edges are as short as the texture's
-    /// detail. An edge longer than eight details is always split, so that no particle is overlooked. In voids alpha is 0: a hole. Any triangles will do, open or not. Shading stays that of the mesh as given. Cost: about 10 colours an edge and round.
+    /// Triangles are bisected at their longest edges (Rivara 1984), so they stay well shaped and no gaps open, until
+    /// the colours along each edge match the interpolation between its ends, or edges are as short as the texture's
+    /// detail. An edge longer than eight details is always split, so that no particle is missed. In voids alpha is 0: a
+    /// hole. The mesh may be open. Shading stays that of the given mesh. Cost: about 10 colours per edge and iteration.
     ///
     /// # Errors
     ///
-    /// [`CarveError`].
+    /// [`CarveError`] states the triangle or option that is not valid.
     ///
     /// # Examples
     ///
@@ -61,7 +65,7 @@ impl Solid {
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
     /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
-    /// // A cube of 12 triangles through a red sphere: fine where the sphere ends.
+    /// // A cube of 12 triangles through a red sphere: fine at the border of the sphere.
     /// let cube = TriangleMesh::cuboid([5.0, 5.0, 5.0]);
     /// let carved = solid.carve(&cube, &|p| p + Vector3::repeat(5.0), &CarveOptions::default(), &|_| ControlFlow::Continue(()))?;
     /// assert_eq!(carved.coarse_edges, 0);
@@ -98,7 +102,7 @@ impl Solid {
         };
         let mut coarse_edges = 0;
         for round in 0.. {
-            // Each round halves edges; how many rounds are left is known only at the end.
+            // Each iteration halves edges; the number of iterations left is known only at the end.
             if progress(1.0 - 0.8_f64.powi(round)).is_break() {
                 return Err(CarveError::Cancelled);
             }
@@ -132,7 +136,7 @@ fn edge(a: u32, b: u32) -> Edge {
     [a.min(b), a.max(b)]
 }
 
-/// What tells whether an edge is fine enough.
+/// Decides whether an edge is short enough.
 struct Measure<'a> {
     colour: &'a (dyn Fn(&Point3<f64>) -> [f32; 4] + Sync),
     place: &'a (dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
@@ -140,13 +144,13 @@ struct Measure<'a> {
     contrast: f32,
 }
 
-/// Edges of more details are split whatever their colours.
+/// Edges longer than this many details are split regardless of their colours.
 const LONGEST: f64 = 8.0;
-/// Edges below two details are as short as they get: halves would be shorter than one.
+/// Edges below two details are not split: halves would be shorter than one detail.
 const SHORTEST: f64 = 2.0;
 
 impl Measure<'_> {
-    /// How much an edge needs to be split; `None` if it does not.
+    /// Difference that requires an edge to be split; `None` if it does not.
     fn need(&self, ends: [&Point3<f64>; 2], colours: [[f32; 4]; 2]) -> Option<f32> {
         let length = ((self.place)(ends[1]) - (self.place)(ends[0])).norm() / self.detail;
         if length < SHORTEST {
@@ -161,7 +165,7 @@ impl Measure<'_> {
         let along = (1..steps as usize).map(|i| i as f64 / steps);
         let off = along.map(|t| {
             let seen = (self.colour)(&(ends[0] + t * (ends[1] - ends[0])));
-            #[allow(clippy::cast_possible_truncation, reason = "a share of an edge")]
+            #[allow(clippy::cast_possible_truncation, reason = "a fraction of an edge")]
             let t = t as f32;
             let between = |c: usize| colours[0][c] + t * (colours[1][c] - colours[0][c]);
             (0..4).map(|c| (seen[c] - between(c)).abs()).fold(0.0, f32::max)
@@ -170,7 +174,7 @@ impl Measure<'_> {
     }
 }
 
-/// The mesh as it is refined.
+/// The mesh during refinement.
 struct Refined {
     mesh: TriangleMesh,
     colours: Vec<[f32; 4]>,
@@ -208,7 +212,7 @@ impl Refined {
         edges.par_iter().filter_map(need).collect()
     }
 
-    /// Splits these edges, and so many others that each triangle that is split is split at its longest edge.
+    /// Splits these edges, and further edges so that each split triangle is split at its longest edge.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "more than 2^32 vertices do not fit into memory"
@@ -245,9 +249,9 @@ impl Refined {
         }
     }
 
-    /// Halves a triangle at its longest edge and its halves at theirs, as far as edges have middles.
+    /// Halves a triangle at its longest edge, and its halves at theirs, where edges have midpoints.
     fn bisect(&mut self, triangle: [u32; 3], normals: [Vector3<f64>; 3], middles: &BTreeMap<Edge, u32>) {
-        // Of a half, only the edge that it has from the whole can have a middle.
+        // In a half, only the edge inherited from the whole triangle can have a midpoint.
         let split = (0..3)
             .filter(|&k| middles.contains_key(&sides(&triangle)[k]))
             .max_by(|&k, &l| {
@@ -268,7 +272,7 @@ impl Refined {
         self.bisect([middle, b, c], [normal, nb, nc], middles);
     }
 
-    /// Which side is longest; of equal ones that of the lowest vertices, so that both triangles at an edge agree.
+    /// The longest side; among equal ones the side with the lowest vertices, so that both triangles at an edge agree.
     fn longest(&self, triangle: &[u32; 3]) -> usize {
         let sides = sides(triangle);
         let longer = |&k: &usize, &l: &usize| {

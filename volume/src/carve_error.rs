@@ -1,8 +1,8 @@
-//! Why a mesh cannot take the colours of a solid.
+//! Errors of carving and baking.
 
 use stereology_shape::TriangleMesh;
 
-/// The largest picture that most readers take.
+/// The largest texture side that most readers accept.
 pub(crate) const MOST_PIXELS: u32 = 16_384;
 
 /// Why a mesh cannot be carved.
@@ -10,10 +10,10 @@ pub(crate) const MOST_PIXELS: u32 = 16_384;
 #[non_exhaustive]
 pub enum CarveError {
     /// The mesh has no triangles.
-    #[error("the mesh has no triangles: there is nothing to carve")]
+    #[error("the mesh has no triangles, so it cannot be carved")]
     Empty,
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names a vertex that is not among the {vertices} vertices")]
+    /// A triangle refers to a missing vertex.
+    #[error("triangle {triangle} refers to a vertex that is not among the {vertices} vertices")]
     Index {
         /// Which triangle.
         triangle: usize,
@@ -23,7 +23,7 @@ pub enum CarveError {
     /// A coordinate is not a finite number, or all are the same.
     #[error("the mesh has no size: its coordinates must be finite, and not all the same")]
     NoSize,
-    /// An option that cannot be.
+    /// An option out of range.
     #[error("detail {detail} and contrast {contrast} must be positive and finite")]
     Options {
         /// Shortest edge.
@@ -31,10 +31,10 @@ pub enum CarveError {
         /// Difference of colours.
         contrast: f32,
     },
-    /// A side of an atlas that cannot be.
-    #[error("no atlas has a side of {pixels} pixels; ask for 1 to 16384")]
+    /// A side of an atlas out of range.
+    #[error("an atlas cannot have a side of {pixels} pixels; 1 to 16384 are possible")]
     Pixels {
-        /// The side asked for.
+        /// The requested side.
         pixels: u32,
     },
     /// The atlas is too small for so many triangles.
@@ -42,25 +42,25 @@ pub enum CarveError {
     Crowded {
         /// Triangles of the mesh.
         triangles: usize,
-        /// The side asked for.
+        /// The requested side.
         pixels: u32,
-        /// The least side that would do: each chart 3 × 3 pixels.
+        /// The smallest sufficient side: each chart has 3 × 3 pixels.
         enough: u64,
     },
-    /// The caller broke off.
+    /// The caller cancelled.
     #[error("cancelled")]
     Cancelled,
 }
 
 fn enough_or_not(enough: u64) -> String {
     if enough > u64::from(MOST_PIXELS) {
-        "nor into any; take colours of vertices, or fewer triangles".to_owned()
+        "nor into any other; use vertex colours, or fewer triangles".to_owned()
     } else {
         format!("at least {enough} are needed, several times as many for detail")
     }
 }
 
-/// Whether a mesh can take colours.
+/// Checks that a mesh can be carved or baked.
 pub(crate) fn check(mesh: &TriangleMesh) -> Result<(), CarveError> {
     let vertices = mesh.vertices.len();
     if mesh.triangles.is_empty() {

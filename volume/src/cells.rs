@@ -1,4 +1,4 @@
-//! Which particles can be at a point: the periodic box cut into cells, each with the particle images that reach into it.
+//! Search grid: cells of the periodic box, each with the particle images that reach into it.
 
 use crate::images::{Image, Images, NONE};
 use crate::narrow::{floor, modulo, number, whole};
@@ -6,20 +6,20 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereology_shape::{Particle, PeriodicBox, UnitBody};
 
-/// Cells made per particle: between a long list in each cell and a long build.
+/// Cells per particle: a compromise between long lists in the cells and a long construction.
 const CELLS_PER_PARTICLE: f64 = 32.0;
 const MOST_CELLS_PER_SIDE: f64 = 512.0;
-/// Share of a cell by which its bounds are widened, more than the rounding of its coordinates.
+/// Fraction of a cell by which its bounds are widened, more than the rounding of its coordinates.
 const SLACK: f64 = 1e-9;
 
-/// The particles as placed bodies, and the cells of the box that they reach into.
+/// The particles, and the cells of the box that they reach into.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     sides: Vector3<f64>,
     counts: [usize; 3],
     cells_per_length: Vector3<f64>,
     placed: Vec<Placed>,
-    /// The particle that fills the whole cell and has the lowest index there, or [`NONE`].
+    /// The particle that covers the whole cell, if it has the lowest index there; otherwise [`NONE`].
     owners: Vec<u32>,
     /// `images[starts[cell]..starts[cell + 1]]` reach into the cell, lowest particle first.
     starts: Vec<u32>,
@@ -27,19 +27,19 @@ pub(crate) struct Cells {
     by_height: Images,
 }
 
-/// A particle, its motion inverted.
+/// A particle with its inverse transformation.
 #[derive(Clone, Debug)]
 struct Placed {
     shape: usize,
     size: f64,
     /// R⁻¹ / size.
     to_local: Matrix3<f64>,
-    /// Radii, about the centre, of the balls outside and inside the particle.
+    /// Radii of the bounding ball and of the inscribed ball about the centre.
     outer: f64,
     inner: f64,
 }
 
-/// How a cell lies to a particle.
+/// How a particle covers a cell.
 #[derive(Clone, Copy, PartialEq)]
 enum Cover {
     Partial,
@@ -47,7 +47,7 @@ enum Cover {
 }
 
 impl Cells {
-    /// Shapes, sizes and positions must have been checked: indices in range, numbers finite and positive.
+    /// The particles must be valid, as in an arrangement.
     pub(crate) fn new(bodies: &[UnitBody], particles: &[Particle], period: &PeriodicBox) -> Self {
         let sides = period.sides();
         let wanted = (CELLS_PER_PARTICLE * particles.len().max(1) as f64 / period.volume()).cbrt();
@@ -171,14 +171,14 @@ impl Cells {
             .map(|image| image.particle as usize)
     }
 
-    /// Whether a particle holds the point at this offset from its centre.
+    /// Whether a particle contains the point at this offset from its centre.
     #[inline]
     pub(crate) fn holds(&self, bodies: &[UnitBody], particle: u32, offset: &Vector3<f64>) -> bool {
         let placed = &self.placed[particle as usize];
         bodies[placed.shape].contains(&placed.local(offset))
     }
 
-    /// The shape of a particle, and what takes offsets from its centre to that shape.
+    /// The shape of a particle, and the matrix from offsets from its centre to that shape.
     pub(crate) fn placed(&self, particle: u32) -> (usize, &Matrix3<f64>) {
         let placed = &self.placed[particle as usize];
         (placed.shape, &placed.to_local)
@@ -189,7 +189,8 @@ impl Cells {
         &self.by_height
     }
 
-    /// Signed distance from a point of the box to the nearest surface: to that of the particle it is in, negative; infinite without particles.
+    /// Signed distance from a point of the box to the nearest surface, negative inside a particle; infinite without
+    /// particles.
     pub(crate) fn distance(&self, bodies: &[UnitBody], p: &Point3<f64>) -> f64 {
         if self.images.is_empty() {
             return f64::INFINITY;
@@ -209,7 +210,7 @@ impl Cells {
         let mut nearest = f64::INFINITY;
         let mut seen: Vec<(u32, Vector3<f64>)> = Vec::new();
         for ring in 0.. {
-            // Everything nearer than this reaches into the rings already seen.
+            // Any particle nearer than this reaches into the rings already visited.
             if nearest <= to_wall + (f64::from(ring) - 1.0) * thinnest {
                 break;
             }

@@ -1,4 +1,4 @@
-//! A mesh laid flat: charts of one or two triangles, and their places in a square of texels.
+//! Texture atlas layout: charts of one or two triangles, and their positions in a square of texels.
 
 use nalgebra::{Matrix2, Matrix3x2, Point2, Point3, Vector2, Vector3};
 use rayon::prelude::*;
@@ -11,12 +11,12 @@ pub(crate) struct Piece {
     pub(crate) triangle: usize,
     /// The triangle's corners in the chart, in lengths of the solid.
     pub(crate) corners: [Point2<f64>; 3],
-    /// Where on the mesh the chart's corner would be, and the steps from there for a unit along the chart and down it.
+    /// The position on the mesh of the chart's corner, and the steps from there per unit along the chart and down it.
     origin: Point3<f64>,
     steps: [Vector3<f64>; 2],
 }
 
-/// One or two triangles laid flat as they are, in the smallest rectangle about them, wider than high.
+/// One or two triangles laid flat without distortion, in their smallest bounding rectangle, wider than high.
 #[derive(Clone, Debug)]
 pub(crate) struct Chart {
     pub(crate) pieces: Vec<Piece>,
@@ -26,10 +26,10 @@ pub(crate) struct Chart {
     height: f64,
 }
 
-/// Triangles lower than this part of their longest edge are taken for lines.
+/// Triangles lower than this fraction of their longest edge count as lines.
 const LINE: f64 = 1e-9;
 
-/// Distances on a triangle do not change where it is laid: first corner at the origin, second along x, third below.
+/// A triangle laid flat without distortion: first corner at the origin, second along x, third below.
 fn laid(corners: [Point3<f64>; 3]) -> [Point2<f64>; 3] {
     let [a, b, c] = corners;
     let length = (b - a).norm();
@@ -39,7 +39,7 @@ fn laid(corners: [Point3<f64>; 3]) -> [Point2<f64>; 3] {
     [Point2::origin(), Point2::new(length, 0.0), Point2::new(x, y)]
 }
 
-/// Corners in another order, from this one on.
+/// Corners in cyclic order from this one on.
 fn turned_to<T: Copy>(k: usize, corners: [T; 3]) -> [T; 3] {
     [0, 1, 2].map(|i| corners[(k + i) % 3])
 }
@@ -85,7 +85,7 @@ impl Piece {
         let steep = flat.determinant().abs() > LINE * long * long;
         let steps = flat.try_inverse().filter(|_| steep).map_or_else(
             || {
-                // A line: nothing across it.
+                // A line: no step across it.
                 let k = longest(&corners);
                 let ([from, to, _], [start, end, _]) = (turned_to(k, corners), turned_to(k, on_mesh));
                 let along = to - from;
@@ -148,7 +148,8 @@ impl Chart {
         }
     }
 
-    /// The point of the mesh at a place of the chart; beyond its edges, of the plane of the triangle on this side of the fold.
+    /// The point of the mesh at a position of the chart; beyond the chart's edges, the point on the plane of the
+    /// triangle on this side of the fold.
     pub(crate) fn point(&self, place: Point2<f64>) -> Point3<f64> {
         let piece = match &self.pieces[..] {
             [first, second] => {
@@ -169,10 +170,10 @@ impl Chart {
     }
 }
 
-/// An edge by its vertices, the lower first, and a triangle that has it as its side `.2`.
+/// An edge by its vertices, the lower first, with a triangle and the number of its side (`.2`).
 type Side = ([u32; 2], usize, usize);
 
-/// Every triangle in one chart: two share one where that saves most area.
+/// Every triangle in a chart; two triangles share one where that saves most area.
 pub(crate) fn charts(mesh: &TriangleMesh, placed: &[Point3<f64>]) -> Vec<Chart> {
     let corners = |of: &[Point3<f64>], triangle: usize| mesh.triangles[triangle].map(|i| of[i as usize]);
     let alone: Vec<Chart> = (0..mesh.triangles.len())
@@ -242,12 +243,12 @@ pub(crate) fn charts(mesh: &TriangleMesh, placed: &[Point3<f64>]) -> Vec<Chart> 
     charts
 }
 
-/// Texels about each chart that belong to it.
+/// Margin of texels around each chart.
 pub(crate) const MARGIN: u32 = 1;
-/// Texels that the smallest chart takes each way.
+/// Texels of the smallest chart along each axis.
 const LEAST: u32 = 1 + 2 * MARGIN;
 
-/// Side of the smallest square into which so many charts go at all.
+/// Side of the smallest square that can contain this many charts.
 pub(crate) fn least_side(charts: usize) -> u64 {
     let mut columns = charts.isqrt() as u64;
     if columns * columns < charts as u64 {
@@ -256,7 +257,7 @@ pub(crate) fn least_side(charts: usize) -> u64 {
     columns * u64::from(LEAST)
 }
 
-/// Rectangle of a chart, its margin included.
+/// Rectangle of a chart, including its margin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rectangle {
     pub(crate) chart: usize,
@@ -266,17 +267,17 @@ pub(crate) struct Rectangle {
     pub(crate) height: u32,
 }
 
-/// Charts in rows, the highest first: shelves.
+/// Charts in rows (shelves), the highest first.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
-    /// Texels a length of the solid.
+    /// Texels per unit of length of the solid.
     pub(crate) scale: f64,
     pub(crate) rectangles: Vec<Rectangle>,
     shelves: Vec<(u32, Range<usize>)>,
 }
 
 impl Layout {
-    /// The layout with the smallest texels that goes into a square of `side` texels; `None` if none does.
+    /// The layout with the smallest texels that fits into a square of `side` texels; `None` if none fits.
     pub(crate) fn new(charts: &[Chart], side: u32) -> Option<Self> {
         let widest = charts.iter().map(|chart| chart.width).fold(0.0, f64::max);
         if u64::from(side) < least_side(charts.len()) {
@@ -292,7 +293,7 @@ impl Layout {
         };
         order.par_sort_unstable_by(higher);
         let at = |scale: f64| Self::at_scale(charts, &order, side, scale);
-        // Nothing larger than a texel always fits; nothing wider than the square ever does.
+        // Charts of one texel always fit; charts wider than the square never do.
         let (mut fits, mut fails) = (1.0 / widest, f64::from(side - 2 * MARGIN) / widest);
         let mut best = at(fits)?;
         if let Some(layout) = at(fails) {
@@ -311,7 +312,7 @@ impl Layout {
     fn at_scale(charts: &[Chart], order: &[usize], side: u32, scale: f64) -> Option<Self> {
         #[allow(
             clippy::cast_possible_truncation,
-            reason = "at most the side, or refused: the cast saturates"
+            reason = "at most the side; larger values saturate and are refused"
         )]
         let texels = |length: f64| ((length * scale - ROUNDING).ceil().max(1.0) as u32).saturating_add(2 * MARGIN);
         let mut rectangles = Vec::with_capacity(order.len());
@@ -354,9 +355,9 @@ impl Layout {
     }
 }
 
-/// The scale is found to a part in 2³⁰.
+/// The scale is found to one part in 2³⁰.
 const BISECTIONS: u32 = 30;
-/// Parts of a texel that a chart may be larger than its rectangle without its margin.
+/// Fraction of a texel by which a chart may exceed its rectangle without its margin.
 const ROUNDING: f64 = 1e-6;
 
 #[cfg(test)]
@@ -368,7 +369,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// Every texel belongs to one chart or none, every triangle to one chart; charts with their margins stay in the square.
+        /// Every texel belongs to one chart or none, every triangle to one chart; charts with their margins stay in the
+        /// square.
         #[test]
         fn charts_do_not_overlap(seed in 0_u64..1000, side in 120_u32..500) {
             let rock = Body::rock(seed).mesh().unwrap().as_triangle_mesh().clone();
@@ -397,7 +399,7 @@ mod tests {
             }
         }
 
-        /// Laid flat, triangles keep their edges' lengths, and a chart leads back to their corners.
+        /// Flat triangles keep their edge lengths, and a chart maps back to their corners.
         #[test]
         fn charts_are_flat_but_true(seed in 0_u64..1000) {
             let mesh = Body::rock(seed).mesh().unwrap().as_triangle_mesh().clone();

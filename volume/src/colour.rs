@@ -1,9 +1,9 @@
-//! Colours added up, and made bytes.
+//! Sums of colours, and their conversion to bytes.
 
 use crate::narrow::byte;
 use wide::{f32x4, f32x8, i16x8, u8x16};
 
-/// Three channels and a fourth of no account, so that they are worked out at once.
+/// Three channels and an unused fourth, computed together.
 pub(crate) type Lanes = f32x4;
 
 pub(crate) fn lanes([r, g, b]: [f32; 3]) -> Lanes {
@@ -14,7 +14,7 @@ pub(crate) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// The channels of four points side by side, each of the same colour.
+/// The channels of four points of the same colour.
 fn side_by_side([r, g, b]: [f32; 3]) -> [Lanes; 3] {
     [[r, g, b, r], [g, b, r, g], [b, r, g, b]].map(Lanes::new)
 }
@@ -40,10 +40,11 @@ pub(crate) fn fill_with_detail(colour: [f32; 3], details: &[f32], row: &mut [f32
     }
 }
 
-/// What is added before a byte is cut off: of it and any value whose fraction is a half the sum is rounded up to the next whole number, of any smaller value it stays below.
+/// Added before truncation to a byte: the sum with a value of fraction one half rounds up to the next whole number;
+/// with any smaller fraction it stays below.
 const HALF: f32 = 0.5_f32.next_down();
 
-/// The only place where colours are clamped: encoded values to bytes, halves rounded up; what is no number becomes 0.
+/// Encoded values as bytes, halves rounded up, NaN as 0. Colours are clamped only here.
 pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
     colour.map(|value| byte(value * 255.0 + HALF))
 }
@@ -52,7 +53,7 @@ pub(crate) fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
 pub(crate) fn row_to_bytes(row: &[f32], bytes: &mut [u8]) {
     let clamped = |values: &[f32]| {
         let value = f32x8::from(values) * f32x8::splat(255.0) + f32x8::splat(HALF);
-        // By comparison, so that what is no number becomes 0.
+        // By comparison, so that NaN becomes 0.
         let value = value & value.simd_gt(f32x8::ZERO);
         i16x8::from_i32x8_saturate(value.fast_min(f32x8::splat(255.0)).fast_trunc_int())
     };
@@ -70,7 +71,8 @@ pub(crate) fn row_to_bytes(row: &[f32], bytes: &mut [u8]) {
 mod tests {
     use super::{row_to_bytes, to_bytes};
 
-    /// Bytes are those of rounding halves up and clamping, at every half, beside it, beyond the ends and for what is no number, one by one and many at a time.
+    /// Bytes are rounded with halves up and clamped, at every half, next to it, outside the range and for NaN, one by
+    /// one and many at a time.
     #[test]
     fn bytes_are_rounded_and_clamped() {
         let halves = (-4..=520).map(|i| i as f32 / 510.0);

@@ -25,17 +25,17 @@ impl Image {
     }
 }
 
-/// All images of the particles that reach into the box, by height.
+/// All images of the particles that reach into the box, sorted by height.
 #[derive(Clone, Debug)]
 pub(crate) struct Images {
-    /// By the z of their centres, ascending.
+    /// Sorted by the z of their centres, ascending.
     images: Vec<Image>,
     /// The largest radius.
     reach: f64,
 }
 
 impl Images {
-    /// Of particles with these radii about their centres.
+    /// The images of particles with these radii about their centres.
     pub(crate) fn new(particles: &[Particle], outer: impl Fn(usize) -> f64, period: &PeriodicBox) -> Self {
         let sides = period.sides();
         let mut images = Vec::with_capacity(particles.len());
@@ -59,7 +59,7 @@ impl Images {
         Self { images, reach }
     }
 
-    /// Those that can hold a point at this z.
+    /// The images that can contain a point at this z.
     pub(crate) fn near(&self, z: f64) -> &[Image] {
         let first = self.images.partition_point(|image| image.centre.z < z - self.reach);
         let end = self.images.partition_point(|image| image.centre.z <= z + self.reach);

@@ -1,17 +1,21 @@
-//! The solid texture: particles, colours and residual, asked at any point; slices, sections, voxels.
+//! The solid texture: particles, colours and residual, evaluated at any point; slices, sections, voxels.
 //!
-//! A [`Solid`] is what a photograph of a cut becomes: particles packed in a box that repeats, each with the mean colour of a profile, a binder with the mean colour of everything else, and the residual that adds fine
-//! detail (Jagnow, Dorsey & Rushmeier 2004, section 4):
+//! A [`Solid`] is reconstructed from a photograph of a cut: particles packed in a periodic box, each with the mean
+//! colour of a profile, a binder with the mean colour of the rest, and a residual that adds fine detail (Jagnow, Dorsey
+//! & Rushmeier 2004, section 4):
 //!
 //! ```text
 //! colour(p) = mean of the particle at p + residual of particles(p)      or      binder + residual of binder(p)
 //! ```
 //!
-//! with p taken modulo the sides of the box and the residual modulo its own period, which divides them. The arithmetic is on sRGB-encoded values / 255 and nothing is clamped before a byte is written.
+//! with p taken modulo the sides of the box and the residual modulo its own period, which divides them. The arithmetic
+//! is on sRGB-encoded values / 255 and values are clamped only when they are written as bytes.
 //!
-//! Which particle is at a point is answered in some 100 ns by a grid of cells, each with the particle images that reach into it; a cell wholly inside a particle names it at once. Distances are true distances. Sections are exact
-//! ([`Solid::section_profiles`], for measuring) or pictures ([`Solid::slice`], for looking at); voxels go to files slab by slab ([`Solid::write_voxels`]). Meshes get its colours at their vertices ([`Solid::carve`])
-//! or in a picture ([`Solid::bake`]).
+//! A grid of cells finds the particle at a point in some 100 ns: each cell lists the particle images that reach into
+//! it, and a cell entirely inside a particle stores that particle. Distances are Euclidean. Sections are exact profiles
+//! ([`Solid::section_profiles`]) or images ([`Solid::slice`]); voxels are written to files slab by slab
+//! ([`Solid::write_voxels`]). Meshes get the solid's colours at their vertices ([`Solid::carve`]) or in a texture
+//! ([`Solid::bake`]).
 //!
 //! # What does a cut through a packing look like?
 //!
@@ -29,12 +33,12 @@
 //! let period = PeriodicBox::new(Vector3::repeat(8.0))?;
 //! let solid = Solid::new(Arrangement::new(vec![rock], particles, period)?, colours, [0.8, 0.8, 0.75], None)?;
 //!
-//! let picture = solid.slice(&SlicePlane::across(Axis::Z, 2.5), 200, 200, 8.0 / 200.0)?;
-//! assert_eq!(picture.get_pixel(50, 50).0, [179, 77, 51]);
+//! let image = solid.slice(&SlicePlane::across(Axis::Z, 2.5), 200, 200, 8.0 / 200.0)?;
+//! assert_eq!(image.get_pixel(50, 50).0, [179, 77, 51]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # How much of it is particles, measured on sections?
+//! # What is the volume fraction of particles, measured on sections?
 //!
 //! ```
 //! # use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -52,10 +56,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What was rejected
+//! # Rejected alternatives
 //!
-//! A voxel volume as the solid itself: it fixes the resolution, and its sections are made of steps. A tree of particles: the grid of cells is faster for packings, whose particles fill space evenly. Plain trilinear lookup of the
-//! residual: between the voxels of white noise it keeps an eighth of the variance, see [`Lookup`].
+//! A voxel volume as the representation of the solid fixes the resolution, and its sections have steps. A tree of
+//! particles is slower than the grid of cells for packings, whose particles fill space evenly. Plain trilinear
+//! interpolation of the residual keeps only an eighth of the variance of white noise between voxels, see [`Lookup`].
 
 mod atlas;
 mod autocovariance;

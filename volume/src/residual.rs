@@ -1,4 +1,4 @@
-//! What is left of a photograph without its mean colours, as a volume that repeats; looked up between its voxels.
+//! The residual: a periodic volume of fine detail, interpolated between its voxels.
 
 use crate::autocovariance::mean_and_autocovariance;
 use crate::colour::{Lanes, lanes};
@@ -9,7 +9,7 @@ use ndarray::Array4;
 /// Fine detail to add to the mean colours: one volume for the binder, one for the particles (section 4.3).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
-    /// Detail of the binder, axes (z, y, x, 3), in encoded colour values, −1 to 1.
+    /// Detail of the binder, axes (z, y, x, 3), in encoded colour values from −1 to 1.
     pub binder: Array4<f32>,
     /// Detail of the particles, likewise; its sizes may differ.
     pub particles: Array4<f32>,
@@ -17,10 +17,11 @@ pub struct Residual {
     pub voxel: f64,
 }
 
-/// How a residual is read between its voxels' centres.
+/// Interpolation of a residual between its voxels' centres.
 ///
-/// Between voxels a weighted mean of eight is less contrasty than the voxels are: of white noise an eighth of the variance is left in the middle. A solid read at other points than its voxels would look blurred, in
-/// planes and stripes where the two grids fall out of step. [`Lookup::VarianceKept`] undoes this exactly, on average over the volume, at every point.
+/// A weighted mean of eight voxels has less contrast than the voxels: for white noise an eighth of the variance is left
+/// in the middle. A solid sampled between voxels would look blurred, in planes and stripes where the two grids are out
+/// of phase. [`Lookup::VarianceKept`] compensates for this exactly, on average over the volume, at every point.
 ///
 /// # Formula
 ///
@@ -30,23 +31,25 @@ pub struct Residual {
 /// A(f,0) = 1 − 2f(1−f),   A(f,1) = 2f(1−f)
 /// ```
 ///
-/// with f the position between the voxels and C the autocovariance at lags (±a, ±b, ±c), averaged over the signs; the gain is at most √8, that of white noise.
+/// with f the position between the voxels and C the autocovariance at lags (±a, ±b, ±c), averaged over the signs; the
+/// gain is at most √8, that of white noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lookup {
-    /// The voxel that holds the point: exact statistics, visible voxels when enlarged.
+    /// The voxel that contains the point: exact statistics, visible voxels when enlarged.
     Nearest,
-    /// The eight nearest voxels, weighted: smooth, less contrast between voxels.
+    /// The weighted mean of the eight nearest voxels: smooth, with less contrast between voxels.
     Trilinear,
-    /// [`Lookup::Trilinear`], its contrast restored.
+    /// [`Lookup::Trilinear`] with its contrast restored.
     #[default]
     VarianceKept,
 }
 
 const MOST_GAIN: f32 = 8.0;
-/// What is nearer to a voxel than this share of the distance between two is at the voxel: more than rounding, less than is seen.
+/// Points nearer to a voxel than this fraction of the voxel spacing count as at the voxel: more than rounding, less
+/// than is visible.
 const AT_VOXEL: f64 = 1e-6;
 
-/// A repeating colour volume prepared for lookups.
+/// A periodic colour volume prepared for lookups.
 #[derive(Clone, Debug)]
 pub(crate) struct Field {
     /// Voxels along x, y, z.
@@ -60,7 +63,7 @@ pub(crate) struct Field {
 }
 
 impl Field {
-    /// Of an array (z, y, x, 3) of at least one voxel.
+    /// From an array (z, y, x, 3) of at least one voxel.
     pub(crate) fn new(array: Array4<f32>, voxels_per_length: Vector3<f64>) -> Self {
         let (nz, ny, nx, _) = array.dim();
         let samples = if array.is_standard_layout() {
@@ -115,7 +118,7 @@ impl Field {
         }
     }
 
-    /// The voxels on both sides of a place along an axis; twice the one that holds it if the nearest is wanted.
+    /// The voxels on both sides of a position along an axis; twice the nearest voxel for [`Lookup::Nearest`].
     pub(crate) fn between(&self, axis: usize, x: f64, lookup: Lookup) -> Between {
         let n = self.sizes[axis];
         if lookup == Lookup::Nearest {
@@ -126,10 +129,10 @@ impl Field {
                 share: 0.0,
             };
         }
-        // Half a voxel off the centres, and a whole period on, so that it is positive.
+        // Relative to voxel centres, plus a whole period so that it is positive.
         let place = x * self.voxels_per_length[axis] - 0.5 + n as f64;
         let (mut floor, mut share) = (whole(place), place.fract());
-        // At a voxel to rounding is at the voxel.
+        // At a voxel to within rounding counts as at the voxel.
         if share < AT_VOXEL {
             share = 0.0;
         } else if share > 1.0 - AT_VOXEL {
@@ -144,7 +147,7 @@ impl Field {
     }
 }
 
-/// Two neighbouring voxels and how near to the second.
+/// Two neighbouring voxels and the weight of the second.
 #[derive(Clone, Copy)]
 pub(crate) struct Between {
     pub(crate) low: usize,
@@ -155,17 +158,17 @@ pub(crate) struct Between {
 /// A field at one y and z.
 pub(crate) struct FieldRow<'a> {
     pub(crate) field: &'a Field,
-    /// Where the rows of voxels around it begin, and their shares.
+    /// Where the surrounding rows of voxels begin, and their weights.
     pub(crate) starts: [usize; 4],
     weights: [f32; 4],
     /// Whether the first of these rows has all the weight.
     pub(crate) at_voxels: bool,
-    /// What trilinear weights leave of the variance: at the voxels' x, and how it falls between them.
+    /// Variance after trilinear weighting: at the voxels' x, and its change between them.
     variance: [Lanes; 2],
     keeps_variance: bool,
 }
 
-/// By what two voxels' values are multiplied and what is added to make the value between them, contrast restored.
+/// Factors of two voxels' values and the constant that give the value between them, with contrast restored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Weights {
     low: Lanes,
@@ -210,12 +213,12 @@ impl FieldRow<'_> {
         }
     }
 
-    /// By what contrast is raised between two voxels.
+    /// Factor of contrast between two voxels.
     fn gain(&self, share: f32) -> Lanes {
         let apart = Lanes::splat(2.0 * share * (1.0 - share));
         let left = self.variance[0] + apart * self.variance[1];
         let whole = self.field.covariance[0];
-        // Where voxels do not vary there is nothing to raise.
+        // Constant voxels have no contrast to restore.
         let whole = whole.simd_gt(Lanes::ZERO).select(whole, Lanes::ONE);
         let least = whole * Lanes::splat(1.0 / MOST_GAIN);
         (whole / left.simd_gt(least).select(left, least)).sqrt()
@@ -229,7 +232,7 @@ mod tests {
     use ndarray::Array4;
     use rand::{RngExt, SeedableRng};
 
-    /// Noise smoothed along x, so that neighbours hang together differently along each axis.
+    /// Noise smoothed along x, so that the correlation of neighbours differs between axes.
     fn noise() -> Array4<f32> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let white = Array4::from_shape_fn((16, 16, 16, 3), |_| rng.random::<f32>());
@@ -238,9 +241,10 @@ mod tests {
         })
     }
 
-    /// At a fixed place between the voxels, the variance over all voxels is that of the voxels themselves: an identity, not an estimate, where the field repeats.
+    /// At a fixed position between the voxels, the variance over all voxels equals that of the voxels themselves: an
+    /// identity for a periodic field.
     #[test]
-    fn variance_is_kept_at_every_place_between_voxels() {
+    fn variance_is_kept_at_every_position_between_voxels() {
         let field = Field::new(noise(), Vector3::repeat(1.0));
         for share in [[0.5, 0.5, 0.5], [0.2, 0.9, 0.6], [0.0, 0.5, 0.0], [0.7, 0.7, 0.1]] {
             let all = (0..16 * 16 * 16).map(|i| {

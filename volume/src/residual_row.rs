@@ -1,23 +1,24 @@
-//! The residual along rows of points: what is worked out for a voxel, or for a place between two, is so once.
+//! The residual along rows of points: values per voxel and per position between voxels are computed once.
 
 use crate::colour::{Lanes, fill_with_detail, lanes};
 use crate::narrow::number;
 use crate::residual::{Between, Field, FieldRow, Lookup, Weights};
 use std::ops::Range;
 
-/// Points that a row is longer than what is asked for.
+/// Points by which a row is longer than requested.
 pub(crate) const SPARE_POINTS: usize = 4;
 
-/// Where the points of a row lie: what is worked out for a voxel or a share is so once, however many points have it. Grids that fit each other have few shares.
+/// Positions of the points of a row between voxels. Values per voxel and per interpolation weight are computed once for
+/// all points that use them. Matching grids have few distinct weights.
 #[derive(Clone, Debug)]
 pub(crate) struct Places {
-    /// The voxels that are read, ascending, those without a gap together.
+    /// The voxels that are read, as ascending ranges without gaps.
     stretches: Vec<Range<usize>>,
-    /// The shares that occur, ascending.
+    /// The weights that occur, ascending.
     shares: Vec<f32>,
-    /// Of each point, where its voxels begin among those that are read, and its share.
+    /// For each point, the positions of its voxels among those that are read, and of its weight.
     places: Vec<Place>,
-    /// Where the points are the voxels, one after the other and again and again: the first of them.
+    /// If the points are the voxels in order, repeated periodically: the first voxel.
     first: Option<usize>,
 }
 
@@ -28,16 +29,16 @@ pub(crate) struct Place {
     share: u32,
 }
 
-/// Where a field along a row is worked out.
+/// Buffers for a field along a row.
 #[derive(Debug, Default)]
 pub(crate) struct Details {
     blended: Vec<f32>,
     weights: Vec<Weights>,
 }
 
-/// A field along a row, at places.
+/// A field along a row, at given positions.
 pub(crate) enum Detail<'a> {
-    /// The voxels of this row, from one on, again and again.
+    /// The voxels of this row from the first on, repeated periodically.
     Voxels { row: &'a [f32], first: usize },
     /// Between the voxels of a row.
     Between {
@@ -48,7 +49,7 @@ pub(crate) enum Detail<'a> {
 }
 
 impl Field {
-    /// Where points along x lie between the voxels, for [`FieldRow::detail`].
+    /// Positions of points along x between the voxels, for [`FieldRow::detail`].
     pub(crate) fn places(&self, points: impl Iterator<Item = f64>, lookup: Lookup) -> Places {
         let between: Vec<Between> = points.map(|x| self.between(0, x, lookup)).collect();
         let [n, ..] = self.sizes;
@@ -79,7 +80,7 @@ impl Field {
 }
 
 impl<'a> FieldRow<'a> {
-    /// The row at places: the same bits as [`Field::at`].
+    /// The row at given positions: the same bits as [`Field::at`].
     pub(crate) fn detail(&self, places: &'a Places, details: &'a mut Details) -> Detail<'a> {
         let [nx, ..] = self.field.sizes;
         let Details { blended, weights } = details;
@@ -110,7 +111,8 @@ impl<'a> FieldRow<'a> {
 }
 
 impl Detail<'_> {
-    /// Writes a mean colour plus the detail at some of the points of a row; up to [`SPARE_POINTS`] after them are written over.
+    /// Writes a mean colour plus the detail at some of the points of a row; up to [`SPARE_POINTS`] points after them
+    /// are overwritten.
     pub(crate) fn write(&self, points: Range<usize>, mean: [f32; 3], row: &mut [f32]) {
         match self {
             Self::Voxels { row: voxels, first } => {
@@ -119,7 +121,7 @@ impl Detail<'_> {
                 while from < points.end {
                     let voxel = (first + from) % period;
                     let end = points.end.min(from + period - voxel);
-                    // Fours of points, as far as there are voxels, are quicker than an exact end.
+                    // Groups of four points, where there are voxels for them, are faster than an exact end.
                     let exact = 3 * (end - from);
                     let fours = exact.next_multiple_of(3 * SPARE_POINTS);
                     let details = &voxels[3 * voxel..];

@@ -1,9 +1,9 @@
-//! Points on a line along x, as voxels lie: what is the same for all of them is worked out once.
+//! Points on a line along x, such as voxel centres.
 
 use crate::narrow::whole_u32;
 use std::ops::Range;
 
-/// How near to the end of a chord, in steps, a point is asked by itself: far more than rounding.
+/// Distance from the end of a chord, in steps, within which points are tested one by one: far more than rounding.
 const SLACK: f64 = 1e-6;
 
 /// The points ((i + ½) step + shift, y, z) of the box, i = 0, 1, ...
@@ -27,14 +27,15 @@ impl Row {
         }
     }
 
-    /// The x of a point. Of 32 bits, as larger whole numbers are slow to turn.
+    /// The x of a point. The index has 32 bits because their conversion is fast.
     pub(crate) fn x(&self, i: u32) -> f64 {
         (f64::from(i) + 0.5) * self.step + self.shift
     }
 
-    /// Of the first `n` points, those at x between the two `possible` ones, and of them those surely between the two `sure` ones; either may be empty.
+    /// The range of the first `n` points whose x is between the two `possible` ones, and the range in it that is
+    /// certainly between the two `sure` ones; either may be empty.
     pub(crate) fn between(&self, possible: [f64; 2], sure: [f64; 2], n: u32) -> [Range<u32>; 2] {
-        // How many points lie before: one more than the whole number below.
+        // Number of points before x: one more than the whole number below.
         let before = |x: f64, slack: f64| whole_u32((x - self.shift) * self.per_step + (0.5 + slack)).min(n);
         let (from, end) = (before(possible[0], -SLACK), before(possible[1], SLACK));
         let end = end.max(from);

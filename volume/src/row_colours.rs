@@ -8,7 +8,7 @@ use crate::row::Row;
 use crate::solid::Solid;
 use crate::strip::Runs;
 
-/// Where the colours of a row are worked out.
+/// Buffers for the colours of a row.
 #[derive(Debug)]
 pub(crate) struct RowColours {
     details: [Details; 2],
@@ -16,7 +16,7 @@ pub(crate) struct RowColours {
 }
 
 impl RowColours {
-    /// For rows of so many points.
+    /// For rows of this many points.
     pub(crate) fn new(points: usize) -> Self {
         Self {
             details: Default::default(),
@@ -26,13 +26,15 @@ impl RowColours {
 }
 
 impl Solid {
-    /// Where the points of a row lie in the residuals of binder and particles: the same for all rows of one step and shift.
+    /// The positions of the points of a row in the residuals of binder and particles, the same for all rows with the
+    /// same step and shift.
     pub(crate) fn places_along(&self, row: &Row, points: usize) -> Option<[Places; 2]> {
         let places = |field: &Field| field.places((0..number(points)).map(|i| row.x(i)), self.lookup());
         self.fields().map(|fields| fields.map(places))
     }
 
-    /// The colours of the points of a row whose runs and places are known, three channels each: the same bits as at the points one by one.
+    /// The colours of the points of a row whose runs and places are known, three channels each: the same bits as
+    /// [`Self::colour_at`] of each point.
     pub(crate) fn colours_along<'a>(
         &self,
         row: &Row,

@@ -1,4 +1,4 @@
-//! Exact sections: the profiles that a plane across an axis shows.
+//! Exact sections: the profiles on a plane perpendicular to an axis.
 
 use crate::solid::Solid;
 use nalgebra::{Unit, UnitVector3, Vector3};
@@ -15,7 +15,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its place in a point: 0, 1, 2.
+    /// Its index in a point: 0, 1, 2.
     #[must_use]
     pub fn index(self) -> usize {
         match self {
@@ -37,10 +37,12 @@ impl Axis {
 }
 
 impl Solid {
-    /// The profiles on one period of the plane across `axis` at `depth`, as (particle, area): exact, from the bodies, not from pixels.
+    /// The profiles on one period of the plane perpendicular to `axis` at `depth`, as (particle, area): exact, from the
+    /// bodies, not from pixels.
     ///
-    /// A particle that is not convex may show several. A profile that the side of the box cuts in two is one profile. Ordered by particle; the area of the period is the product of the two other sides. Cost: one test a particle, and
-    /// a section of each that is cut.
+    /// A particle that is not convex may have several. A profile divided by the side of the box is one profile.
+    /// Profiles are ordered by particle; the area of the period is the product of the two other sides. Cost: one test
+    /// per particle, and one section of each that is cut.
     ///
     /// # Examples
     ///
@@ -52,7 +54,7 @@ impl Solid {
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(9.0, 5.0, 9.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
     /// # let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
-    /// // A sphere of diameter 6 about z = 9, cut 2 units off its centre by its image's side: π (3² − 2²).
+    /// // A sphere of diameter 6 about z = 9, cut 2 units from the centre of its image: π (3² − 2²).
     /// let profiles = solid.section_profiles(Axis::Z, 1.0);
     /// assert_eq!(profiles.len(), 1);
     /// assert!((profiles[0].1 - 5.0 * std::f64::consts::PI).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Pictures of plane sections.
+//! Images of plane sections.
 
 use crate::colour::{add, to_bytes};
 use crate::narrow::{number, whole_u32};
@@ -10,12 +10,12 @@ use nalgebra::{Point3, Unit, UnitVector3, Vector3};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-/// Pictures have at most this many pixels.
+/// Images have at most this many pixels.
 const MOST_PIXELS: u64 = 1 << 30;
-/// A pixel larger than the residual's voxels averages at most this many of them each way.
+/// A pixel larger than the residual's voxels averages at most this many of them along each axis.
 const MOST_RESIDUAL_SAMPLES: f64 = 4.0;
 
-/// A plane with the directions of a picture on it: where the picture's corner is, which way its columns and rows run.
+/// A plane with the position and orientation of an image on it: its corner and the directions of its rows and columns.
 ///
 /// # Examples
 ///
@@ -23,7 +23,7 @@ const MOST_RESIDUAL_SAMPLES: f64 = 4.0;
 /// use nalgebra::{Point3, Vector3};
 /// use stereology_volume::{Axis, SlicePlane};
 ///
-/// // Rows of a section across z run along x, as in an array (z, y, x).
+/// // Rows of a section perpendicular to z run along x, as in an array (z, y, x).
 /// let plane = SlicePlane::across(Axis::Z, 3.0);
 /// assert_eq!(plane.point(1.0, 2.0), Point3::new(1.0, 2.0, 3.0));
 ///
@@ -40,7 +40,8 @@ pub struct SlicePlane {
 }
 
 impl SlicePlane {
-    /// The plane across an axis at a depth along it, in units of length. The picture is the slice of an array (z, y, x): its rows run along the faster of the other two axes.
+    /// The plane perpendicular to an axis at a depth along it, in units of length. The image is the slice of an array
+    /// (z, y, x): its rows run along the faster of the other two axes.
     #[must_use]
     pub fn across(axis: Axis, depth: f64) -> Self {
         let (right, down) = match axis {
@@ -55,7 +56,8 @@ impl SlicePlane {
         }
     }
 
-    /// The plane n·p = `offset` with n the normal made of length 1; the picture's corner is its point nearest to the origin.
+    /// The plane n·p = `offset`, where n is the normalised normal; the image's corner is its point nearest to the
+    /// origin.
     ///
     /// # Errors
     ///
@@ -69,9 +71,9 @@ impl SlicePlane {
         if !(normal.iter().all(|x| x.is_finite()) && largest > 0.0 && offset.is_finite()) {
             return Err(refused);
         }
-        // First by the largest component, or the square of a huge or tiny one would not be a number.
+        // Divided by the largest component first, as squares of very large or small components would overflow.
         let normal = Unit::new_normalize(normal / largest);
-        // The axis that is farthest from the normal, x if it may be, gives the direction of the rows.
+        // The rows follow the x axis, or the y axis if the normal is close to x.
         let along = if normal.x.abs() < 0.9 {
             Vector3::x()
         } else {
@@ -86,7 +88,7 @@ impl SlicePlane {
         })
     }
 
-    /// The point `right` and `down` units of length from the picture's corner.
+    /// The point `right` and `down` units of length from the image's corner.
     #[must_use]
     pub fn point(&self, right: f64, down: f64) -> Point3<f64> {
         self.corner + right * self.right.into_inner() + down * self.down.into_inner()
@@ -94,14 +96,16 @@ impl SlicePlane {
 }
 
 impl Solid {
-    /// Picture of a section: `width` × `height` pixels of edge `pixel`.
+    /// Image of a section: `width` × `height` pixels of edge `pixel`.
     ///
-    /// A pixel whose corners lie in different particles is looked at in n × n places ([`Solid::with_border_samples`]) and gets the mean of their colours, as a photograph's pixel does; the residual is taken at its centre, or averaged over at most
-    /// 4 × 4 places where a pixel is larger than the residual's voxels. All other pixels have the colour of their centre. The same bytes at any number of threads.
+    /// A pixel whose corners lie in different particles is sampled at n × n points ([`Solid::with_border_samples`]) and
+    /// gets the mean of their colours, like the pixel of a photograph. The residual is taken at its centre, or averaged
+    /// over at most 4 × 4 points if a pixel is larger than the residual's voxels. All other pixels have the colour of
+    /// their centre. The bytes are the same at any number of threads.
     ///
     /// # Errors
     ///
-    /// [`SolidError::Picture`] if `pixel` is no positive length or the picture has no or more than 2³⁰ pixels.
+    /// [`SolidError::Picture`] if `pixel` is not a positive length or the image has no or more than 2³⁰ pixels.
     ///
     /// # Examples
     ///
@@ -113,10 +117,10 @@ impl Solid {
     /// # let particle = Particle { shape: 0, size: 6.0, category: 0, position: Point3::new(5.0, 5.0, 5.0), orientation: UnitQuaternion::identity() };
     /// # let period = PeriodicBox::new(Vector3::repeat(10.0))?;
     /// let solid = Solid::new(Arrangement::new(vec![sphere], vec![particle], period)?, vec![[1.0, 0.0, 0.0]], [0.0; 3], None)?;
-    /// let picture = solid.slice(&SlicePlane::across(Axis::Z, 5.0), 100, 100, 0.1)?;
-    /// assert_eq!(picture.get_pixel(50, 50).0, [255, 0, 0]);
-    /// assert_eq!(picture.get_pixel(10, 10).0, [0, 0, 0]);
-    /// let red: f64 = picture.pixels().map(|p| f64::from(p.0[0]) / 255.0 * 0.01).sum();
+    /// let image = solid.slice(&SlicePlane::across(Axis::Z, 5.0), 100, 100, 0.1)?;
+    /// assert_eq!(image.get_pixel(50, 50).0, [255, 0, 0]);
+    /// assert_eq!(image.get_pixel(10, 10).0, [0, 0, 0]);
+    /// let red: f64 = image.pixels().map(|p| f64::from(p.0[0]) / 255.0 * 0.01).sum();
     /// assert!((red - 9.0 * std::f64::consts::PI).abs() < 0.02); // the area of the profile
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -166,7 +170,7 @@ impl Solid {
         ids.map_err(|_| SolidError::Picture { width, height, pixel })
     }
 
-    /// Colour of the pixel whose corner is at (left, top) of the picture.
+    /// Colour of the pixel whose corner is at (left, top) of the image.
     fn pixel_colour(
         &self,
         plane: &SlicePlane,

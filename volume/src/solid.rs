@@ -1,4 +1,4 @@
-//! The solid: what is at a point of a material that repeats.
+//! The solid: the particle, colour and distance at any point of a periodic material.
 
 use crate::cells::Cells;
 use crate::colour::add;
@@ -13,14 +13,15 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 use stereology_shape::{Arrangement, Particle, PeriodicBox, UnitBody};
 
-/// The balls about the particles may have this many times the volume of the box.
+/// The bounding balls of the particles may have this many times the volume of the box.
 const MOST_CROWDED: f64 = 64.0;
 /// Relative error allowed where a side of the box must be a multiple of the residual's period.
 const PERIOD_TOLERANCE: f64 = 1e-6;
 
-/// A solid texture: particles in a binder with the residual of a photograph, known at every point of space.
+/// A solid texture: particles in a binder with the residual of a photograph, defined at every point of space.
 ///
-/// The solid repeats with the sides of its box. Where particles overlap, the one with the lower index is seen. Copies share their data.
+/// The solid repeats with the sides of its box. Where particles overlap, the one with the lower index is visible.
+/// Copies share their data.
 ///
 /// # Examples
 ///
@@ -64,14 +65,15 @@ struct Fields {
 }
 
 impl Solid {
-    /// Puts a solid together.
+    /// A solid of coloured particles in a binder.
     ///
-    /// `colours[i]` is the mean colour of particle i and `binder` that of the binder, sRGB-encoded values / 255; the residual, if any, is added to them: the binder's outside, the particles' inside.
-    /// Positions may lie outside the box. Cost: less than 1 µs a cell of the search grid, 32 cells a particle.
+    /// `colours[i]` is the mean colour of particle i and `binder` that of the binder, sRGB-encoded values / 255; the
+    /// residual, if any, is added to them: its binder part outside particles, its particle part inside. Positions may
+    /// lie outside the box. Cost: less than 1 µs per cell of the search grid, with 32 cells per particle.
     ///
     /// # Errors
     ///
-    /// [`SolidError`] says which particle, colour or residual does not fit, and why.
+    /// [`SolidError`] states which particle, colour or residual is not valid, and why.
     pub fn new(
         arrangement: Arrangement,
         colours: Vec<[f32; 3]>,
@@ -101,8 +103,7 @@ impl Solid {
         })
     }
 
-    /// How the residual is read between its voxels; [`Lookup::VarianceKept`] unless said otherwise.
-    ///
+    /// Interpolation of the residual between its voxels; [`Lookup::VarianceKept`] by default.
     #[must_use]
     pub fn with_lookup(self, lookup: Lookup) -> Self {
         Self { lookup, ..self }
@@ -123,7 +124,7 @@ impl Solid {
         })
     }
 
-    /// The same solid in its mean colours alone, as in figure 5 (a).
+    /// The same solid in its mean colours only, as in figure 5 (a).
     #[must_use]
     pub fn without_residual(&self) -> Self {
         Self {
@@ -134,7 +135,8 @@ impl Solid {
 
     /// The same solid whose particles of these shapes (indices of [`Self::bodies`]) are voids.
     ///
-    /// They keep the colour that their profiles have on a photograph, which slices and voxels show; their alpha is 0, and pictures and carved meshes show holes.
+    /// They keep the colour of their profiles in the photograph, which slices and voxels show. Their alpha is 0, and
+    /// rendered images and carved meshes show holes.
     ///
     /// # Errors
     ///
@@ -213,13 +215,14 @@ impl Solid {
         self.binder
     }
 
-    /// The box with whose sides the solid repeats.
+    /// The box whose sides are the periods of the solid.
     #[must_use]
     pub fn period(&self) -> &PeriodicBox {
         self.arrangement.period()
     }
 
-    /// Index of the particle at a point, `None` in the binder. Some 100 ns, hardly more for more particles.
+    /// Index of the particle at a point, `None` in the binder. Some 100 ns, nearly independent of the number of
+    /// particles.
     #[must_use]
     pub fn id_at(&self, p: &Point3<f64>) -> Option<usize> {
         self.id_within(&self.period().wrap(p))
@@ -231,7 +234,7 @@ impl Solid {
         self.id_at(p).map(|id| self.particles()[id].category)
     }
 
-    /// Colour at a point: mean colour plus residual. Not clamped: values may leave 0..1 by what the residual adds.
+    /// Colour at a point: mean colour plus residual. Not clamped: the residual may take values outside 0..1.
     #[must_use]
     pub fn colour_at(&self, p: &Point3<f64>) -> [f32; 3] {
         let p = self.period().wrap(p);
@@ -243,9 +246,10 @@ impl Solid {
         }
     }
 
-    /// Colours at many points, in their order, shared among threads: the same bits as [`Self::colour_at`], at any number of them.
+    /// Colours at many points, in their order, in parallel: the same bits as [`Self::colour_at`] at any number of
+    /// threads.
     ///
-    /// Points are looked up along a curve through the box, so that random ones find what the one before has fetched.
+    /// Points are evaluated in the order of a curve through the box, so that random points make good use of the cache.
     ///
     /// ```
     /// # use nalgebra::{Point3, Vector3};
@@ -260,7 +264,7 @@ impl Solid {
         let place = |p: &Point3<f64>| self.period().curve_place(p);
         let mut order: Vec<(u32, usize)> = points.par_iter().map(place).zip(0..points.len()).collect();
         order.par_sort_unstable();
-        // Fetched by themselves, many at a time.
+        // Gathered in a separate pass, many at a time.
         let sorted: Vec<Point3<f64>> = order.par_iter().map(|&(_, i)| points[i]).collect();
         let sorted: Vec<[f32; 3]> = sorted
             .par_iter()
@@ -274,9 +278,10 @@ impl Solid {
         colours
     }
 
-    /// Distance to the nearest surface of a particle, negative inside; infinite without particles. A microsecond or more: exact, not a table.
+    /// Distance to the nearest surface of a particle, negative inside; infinite without particles. Exact; it takes a
+    /// microsecond or more.
     ///
-    /// Inside, it is the distance to the particle's own surface: without overlap no other is nearer.
+    /// Inside a particle it is the distance to that particle's surface; without overlaps no other surface is nearer.
     #[must_use]
     pub fn distance_at(&self, p: &Point3<f64>) -> f64 {
         self.cells.distance(self.bodies(), &self.period().wrap(p))
@@ -286,12 +291,12 @@ impl Solid {
         self.cells.particle_at(self.bodies(), p)
     }
 
-    /// The particles that some rows meet.
+    /// The particles met by some rows.
     pub(crate) fn strip(&self, z: f64, ys: [f64; 2]) -> Strip<'_> {
         self.cells.strip(self.bodies(), z, ys)
     }
 
-    /// The voids that some rows meet; `None` without voids.
+    /// The voids met by some rows; `None` without voids.
     pub(crate) fn strip_of_voids(&self, z: f64, ys: [f64; 2]) -> Option<Strip<'_>> {
         self.voids.as_ref().map(|voids| voids.strip(self.bodies(), z, ys))
     }
@@ -325,7 +330,7 @@ impl Solid {
     }
 }
 
-/// What a solid requires of an arrangement that others do not.
+/// Requirements of a solid beyond those of any arrangement.
 fn check_particles(arrangement: &Arrangement) -> Result<(), SolidError> {
     let side = arrangement.sides().min();
     let mut balls = 0.0;
@@ -395,7 +400,7 @@ impl Fields {
                         period: length,
                     });
                 }
-                // From the side, not the voxel, so that the last period ends exactly where the box does.
+                // Computed from the side, not from the voxel, so that the last period ends exactly with the box.
                 voxels_per_length[k] = periods * n as f64 / side;
             }
             Ok(Field::new(array, voxels_per_length))

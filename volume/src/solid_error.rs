@@ -1,11 +1,12 @@
-//! Why particles, colours and residual do not make a solid, or a solid no image.
+//! Why a solid, or an image of it, cannot be made.
 
-/// A particle may be this many times the shortest side of the box across, its own images overlapping then: a guard against sizes and boxes of different units.
+/// A particle may be this many times as long as the shortest side of the box (its own images then overlap): a guard
+/// against sizes and boxes in different units.
 pub(crate) const LARGEST_PARTICLE: f64 = 2.0;
 /// Largest number of points per pixel along each axis.
 pub(crate) const MOST_BORDER_SAMPLES: u32 = 16;
 
-/// Why particles, colours and residual do not make a solid.
+/// Why a solid, or an image of it, cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolidError {
@@ -21,7 +22,7 @@ pub enum SolidError {
         /// The box's shortest side.
         side: f64,
     },
-    /// The particles overlap many times over.
+    /// The particles overlap too often.
     #[error(
         "the balls about the particles have {times:.0} times the volume of the box; are sizes and box in the same unit?"
     )]
@@ -29,29 +30,30 @@ pub enum SolidError {
         /// Volume of the balls over that of the box.
         times: f64,
     },
-    /// Category 255 has no number left in the exported channel, where 0 is the binder.
+    /// Category 255 cannot be numbered in the exported channel, where 0 is the binder.
     #[error("particle {particle} is of category 255; categories go from 0 to 254")]
     Category {
         /// Index of the particle.
         particle: usize,
     },
-    /// There must be one colour a particle.
-    #[error("{colours} colours for {particles} particles; give one each")]
+    /// There must be one colour per particle.
+    #[error("{colours} colours for {particles} particles; one per particle is needed")]
     Colours {
         /// Colours given.
         colours: usize,
         /// Particles given.
         particles: usize,
     },
-    /// A colour is no finite number.
+    /// A colour is not finite.
     #[error("the colour of {} is not finite", match particle { Some(i) => format!("particle {i}"), None => "the binder".into() })]
     Colour {
         /// Index of the particle; `None`: the binder's colour.
         particle: Option<usize>,
     },
-    /// A residual is empty, not of three channels, not finite, or its voxel is no positive length.
+    /// A residual is empty, without three channels, not finite, or its voxel is not a positive length.
     #[error(
-        "the residual of the {part} has axes (z, y, x, channel) {shape:?} and voxel {voxel}; it needs at least one voxel, three channels, finite values and a positive voxel"
+        "the residual of the {part} has voxels (x, y, z) = ({}, {}, {}), {} channels and voxels of edge {voxel}; it needs at least one voxel, three channels, finite values and a positive edge",
+        .shape[2], .shape[1], .shape[0], .shape[3]
     )]
     Residual {
         /// `binder` or `particles`.
@@ -61,24 +63,28 @@ pub enum SolidError {
         /// Edge of a voxel.
         voxel: f64,
     },
-    /// A void is of a shape that is not there.
+    /// A void has a shape that does not exist.
     #[error("shape {shape} cannot be a void: there are {bodies} shapes, counted from 0")]
     Void {
-        /// The shape named.
+        /// The shape given.
         shape: usize,
         /// Number of bodies.
         bodies: usize,
     },
-    /// A plane has no direction or no place.
-    #[error("no plane has normal {normal:?} and offset {offset}; the normal must not be zero, and all must be finite")]
+    /// A plane without direction or position.
+    #[error(
+        "a plane cannot have normal {normal:?} and offset {offset}; the normal must not be zero, and all numbers must be finite"
+    )]
     Plane {
         /// The normal given.
         normal: [f64; 3],
         /// The offset given.
         offset: f64,
     },
-    /// A picture that cannot be made.
-    #[error("no picture has {width} x {height} pixels of edge {pixel}; ask for 1 to 2^30 pixels of a positive edge")]
+    /// An image that cannot be made.
+    #[error(
+        "an image cannot have {width} x {height} pixels of edge {pixel}; 1 to 2^30 pixels of a positive edge are possible"
+    )]
     Picture {
         /// Pixels along a row.
         width: u32,
@@ -92,7 +98,7 @@ pub enum SolidError {
     BorderSamples(u32),
     /// The residual does not repeat with the box.
     #[error(
-        "the box's side of {side} along {axis} is no multiple of the residual's period of {period}; round the box, or the solid would have a seam"
+        "the box's side of {side} along {axis} is not a multiple of the residual's period of {period}; adjust the box, otherwise the solid would have a seam"
     )]
     Period {
         /// `x`, `y` or `z`.

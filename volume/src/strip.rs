@@ -1,4 +1,4 @@
-//! Which particle each point of a row is in: the chords of the particles that the row meets cut it into runs.
+//! The particle at each point of a row: the chords of the particles that the row meets divide it into runs.
 
 use crate::cells::Cells;
 use crate::images::{Image, NONE};
@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 use stereology_shape::{Chords, UnitBody};
 
-/// What rows at one z and neighbouring y meet.
+/// The particles met by rows at one z and neighbouring y.
 #[derive(Debug)]
 pub(crate) struct Strip<'a> {
     cells: &'a Cells,
@@ -20,20 +20,20 @@ pub(crate) struct Strip<'a> {
 #[derive(Debug)]
 struct Section {
     image: Image,
-    /// Squared radius of the circle that its ball leaves on the plane.
+    /// Squared radius of the circle in which its bounding ball meets the plane.
     circle: f64,
-    /// Of the lines along x, by their y from the image's centre, from the x of that centre on.
+    /// Chords of the lines along x, relative to the image's centre.
     chords: Chords,
 }
 
-/// Points of a row that are in one particle, or in none.
+/// Consecutive points of a row in the same particle, or in none.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     end: u32,
     id: u32,
 }
 
-/// A row cut into runs.
+/// A row divided into runs.
 #[derive(Debug)]
 pub(crate) struct Runs {
     points: u32,
@@ -43,13 +43,13 @@ pub(crate) struct Runs {
 }
 
 impl Cells {
-    /// What the rows at `z` and y from `ys[0]` to `ys[1]` meet.
+    /// The particles met by the rows at `z` and y from `ys[0]` to `ys[1]`.
     pub(crate) fn strip<'a>(&'a self, bodies: &'a [UnitBody], z: f64, ys: [f64; 2]) -> Strip<'a> {
         let circle = |image: &Image| image.outer_squared - (z - image.centre.z).powi(2);
         let beside = |image: &Image| (ys[0] - image.centre.y).max(image.centre.y - ys[1]).max(0.0);
         let near = self.images().near(z).iter();
         let mut met: Vec<&Image> = near.filter(|image| beside(image).powi(2) < circle(image)).collect();
-        // So that runs come nearly in their order.
+        // So that runs are found nearly in order.
         met.sort_unstable_by(|a, b| a.centre.x.total_cmp(&b.centre.x));
         let section = |image: &Image| {
             let (shape, to_local) = self.placed(image.particle);
@@ -71,7 +71,8 @@ impl Cells {
 }
 
 impl Strip<'_> {
-    /// Cuts a row of it into runs: what [`Cells::particle_at`] says of every point, at the cost of a chord a particle.
+    /// Divides one of its rows into runs: the results of [`Cells::particle_at`] for all points, at the cost of one
+    /// chord per particle.
     pub(crate) fn cut(&self, row: &Row, runs: &mut Runs) {
         runs.spans.clear();
         for section in &self.sections {
@@ -105,7 +106,7 @@ impl Strip<'_> {
 }
 
 impl Runs {
-    /// For rows of so many points.
+    /// For rows of this many points.
     pub(crate) fn new(points: usize) -> Self {
         Self {
             points: number(points),
@@ -115,7 +116,7 @@ impl Runs {
         }
     }
 
-    /// The runs in their order, and the particle that each is in.
+    /// The runs in order, and the particle of each.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Range<usize>, Option<usize>)> {
         let mut from = 0;
         self.runs.iter().map(move |run| {
@@ -125,7 +126,7 @@ impl Runs {
         })
     }
 
-    /// Puts a span into its place among the others, which is nearly always among the last; joins it to the one that it goes on with.
+    /// Inserts a span in order, nearly always at the end, or extends the span that it continues.
     fn add(&mut self, points: Range<u32>, id: u32) {
         if points.is_empty() {
             return;
@@ -137,7 +138,7 @@ impl Runs {
         }
     }
 
-    /// Makes runs of the spans.
+    /// Converts the spans to runs.
     fn join(&mut self) {
         self.runs.clear();
         let mut end = 0;
@@ -162,7 +163,7 @@ impl Runs {
         }
     }
 
-    /// Point by point: where particles overlap, the lowest index is seen.
+    /// Point by point: where particles overlap, the lowest index is visible.
     fn join_overlapping(&mut self) {
         self.ids.clear();
         self.ids.resize(self.points as usize, NONE);

@@ -1,11 +1,14 @@
-//! A turn that hides the repetition of a solid.
+//! A rotation that hides the period of a solid.
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 
-/// A point seen through a fixed turn about the origin, after which no flat face of a mesh that stands upright shows the solid's period: its planes cut the box along no short vector of its lattice.
+/// A point rotated about the origin by a fixed rotation. After it, no flat face of an axis-aligned mesh shows the
+/// solid's period: its planes contain no short vector of the box's lattice.
 ///
-/// A solid repeats with its box; a face along the box's axes shows the same particles in rows and columns, one that is turned shows each particle at another height every time, as the paper suggests (Jagnow, Dorsey & Rushmeier 2004, section 4.1).
-/// Of 60,000 random turns it is the one whose planes stay farthest from lattice vectors of up to six periods: a fiftieth of a period.
+/// A solid repeats with its box. A face along the box's axes shows the same particles in rows and columns; a rotated
+/// face cuts each particle at a different height every time, as the paper suggests (Jagnow, Dorsey & Rushmeier 2004,
+/// section 4.1). Of 60,000 random rotations it is the one whose planes stay farthest from lattice vectors of up to six
+/// periods: a fiftieth of a period.
 ///
 /// # Examples
 ///
@@ -26,7 +29,8 @@ mod tests {
     use super::turned;
     use nalgebra::{Point3, Vector3};
 
-    /// No lattice vector up to six periods long lies within a fiftieth of a period of an upright plane, so none shows the period.
+    /// No lattice vector up to six periods long lies within a fiftieth of a period of an upright plane, so none shows
+    /// the period.
     #[test]
     fn upright_planes_hold_no_short_lattice_vector() {
         let lattice = (-6..=6_i32).flat_map(|x| (-6..=6_i32).flat_map(move |y| (-6..=6_i32).map(move |z| [x, y, z])));

@@ -6,7 +6,7 @@ use crate::strip::Strip;
 use nalgebra::Point3;
 use stereology_shape::{Arrangement, Particle, UnitBody};
 
-/// Which shapes are voids, and where they are.
+/// The shapes that are voids, and their positions.
 #[derive(Debug)]
 pub(crate) struct Voids {
     shapes: Vec<usize>,
@@ -46,7 +46,7 @@ impl Voids {
         self.cells.particle_at(bodies, p).is_some()
     }
 
-    /// The voids that some rows meet.
+    /// The voids met by some rows.
     pub(crate) fn strip<'a>(&'a self, bodies: &'a [UnitBody], z: f64, ys: [f64; 2]) -> Strip<'a> {
         self.cells.strip(bodies, z, ys)
     }

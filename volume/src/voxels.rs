@@ -15,13 +15,13 @@ use std::str::FromStr;
 use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
 use stereology_metrics::Progress;
 
-/// Rows that are worked on together: enough to share what they meet, few enough to share among threads.
+/// Rows processed together: enough to share the particles they meet, few enough to distribute among threads.
 const ROWS_AT_A_TIME: usize = 64;
 
-/// What a voxel says of the point at its centre.
+/// The property of the solid that voxels hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Colour: three of `u8`, clamped here and nowhere before.
+    /// Colour: three `u8`, clamped only here.
     Rgb,
     /// Particle: `u32`, 0 in the binder, else the particle's index + 1.
     Id,
@@ -33,9 +33,9 @@ pub enum Channel {
     Alpha,
 }
 
-/// A name that is no channel.
+/// A name that is not a channel.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no channel; use rgb, id, category, distance or alpha")]
+#[error("'{name}' is not a channel; use rgb, id, category, distance or alpha")]
 #[non_exhaustive]
 pub struct ChannelError {
     /// The name given.
@@ -57,14 +57,15 @@ impl FromStr for Channel {
     }
 }
 
-/// How many voxels one period has along x, y, z, and how large they are.
+/// Number and size of the voxels of one period along x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelGrid {
     /// Voxels along x, y, z.
     pub counts: [usize; 3],
     /// Edges of a voxel along x, y, z: side / count, so they may differ a little where the box is not cubic.
     pub spacing: [f64; 3],
-    /// A colour is the mean over this many points along each axis of its voxel (a box filter); 1: the colour of its centre.
+    /// A colour is the mean over this many points along each axis of its voxel (a box filter); 1: the colour of its
+    /// centre.
     pub samples: usize,
 }
 
@@ -83,7 +84,7 @@ impl VoxelGrid {
         Point3::new(along(i, 0), along(j, 1), along(k, 2))
     }
 
-    /// Where so many rows of voxels begin and end.
+    /// The y range of some rows of voxels.
     fn ends_along_y(&self, first: usize, rows: usize) -> [f64; 2] {
         [first, first + rows].map(|y| y as f64 * self.spacing[1])
     }
@@ -96,7 +97,8 @@ impl VoxelGrid {
 }
 
 impl Solid {
-    /// One period with `along_longest` voxels (at least 1) along the longest side and as many along the others as keep them nearly cubic.
+    /// One period with `along_longest` voxels (at least 1) along the longest side, and numbers along the others that
+    /// keep voxels nearly cubic.
     ///
     /// ```
     /// # use nalgebra::Vector3;
@@ -112,7 +114,7 @@ impl Solid {
         let sides = self.period().sides();
         let counts = [0, 1, 2].map(|k| {
             let share = sides[k] / sides.max();
-            // The longest side gets exactly what was asked for, however large that number is.
+            // The longest side gets exactly the requested number, however large.
             if share >= 1.0 {
                 along_longest.max(1)
             } else {
@@ -126,13 +128,14 @@ impl Solid {
         }
     }
 
-    /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, rows shared among threads.
+    /// Fills the slab of voxels at `z` with colours; axes (y, x, channel), three channels, in parallel over rows.
     ///
-    /// The colour of a voxel is the mean over `grid.samples`³ points spread evenly in it; 4³ leave steps of 1/64 at the borders of particles.
+    /// The colour of a voxel is the mean over `grid.samples`³ points spread evenly in it; 4³ leave steps of 1/64 at the
+    /// borders of particles.
     ///
     /// # Panics
     ///
-    /// If the slab has not the shape of `grid`.
+    /// If the slab does not have the shape of `grid`.
     pub fn fill_rgb(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, u8>) {
         let n = grid.samples.max(1);
         let along = |i: usize, axis: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * grid.spacing[axis];
@@ -177,7 +180,7 @@ impl Solid {
     ///
     /// # Panics
     ///
-    /// If the slab has not the shape of `grid`.
+    /// If the slab does not have the shape of `grid`.
     pub fn fill_ids(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u32>) {
         let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
         fill_by_id(grid, z, slab, strip, |id| id.map_or(0, |id| number(id) + 1));
@@ -187,7 +190,7 @@ impl Solid {
     ///
     /// # Panics
     ///
-    /// If the slab has not the shape of `grid`.
+    /// If the slab does not have the shape of `grid`.
     pub fn fill_categories(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
         let strip = |z: f64, ys: [f64; 2]| Some(self.strip(z, ys));
         fill_by_id(grid, z, slab, strip, |id| {
@@ -199,7 +202,7 @@ impl Solid {
     ///
     /// # Panics
     ///
-    /// If the slab has not the shape of `grid`.
+    /// If the slab does not have the shape of `grid`.
     pub fn fill_distances(&self, grid: &VoxelGrid, z: usize, mut slab: ArrayViewMut3<'_, f32>) {
         by_strips(grid, 1, &mut slab, |first, rows| {
             for (y, row) in (first..).zip(rows) {
@@ -214,19 +217,21 @@ impl Solid {
     ///
     /// # Panics
     ///
-    /// If the slab has not the shape of `grid`.
+    /// If the slab does not have the shape of `grid`.
     pub fn fill_alpha(&self, grid: &VoxelGrid, z: usize, slab: ArrayViewMut3<'_, u8>) {
         let strip = |z: f64, ys: [f64; 2]| self.strip_of_voids(z, ys);
         fill_by_id(grid, z, slab, strip, |void| if void.is_some() { 0 } else { 255 });
     }
 
-    /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at any number of threads.
+    /// Writes one period of the solid as voxels of `grid`, as a file of any format; all formats hold the same bytes, at
+    /// any number of threads.
     ///
-    /// `progress` is told the share that is done and may break off. Memory beside the solid: what the format needs, two slabs or some more ([`write_volume`]).
+    /// `progress` receives the fraction done and may cancel. Memory in addition to the solid: that of the format, two
+    /// slabs or somewhat more ([`write_volume`]).
     ///
     /// # Errors
     ///
-    /// [`GridError`], [`GridError::Cancelled`] included; nothing is left behind then.
+    /// [`GridError`], including [`GridError::Cancelled`]; no file is left then.
     ///
     /// # Examples
     ///
@@ -259,7 +264,8 @@ impl Solid {
         self.write(path.as_ref(), format, grid, channel, false, progress)
     }
 
-    /// Writes the same file as [`Self::write_voxels`], goes on from `FILE.partial` if there is one, and leaves it there if it is broken off: see [`resume_volume`].
+    /// Writes the same file as [`Self::write_voxels`], but continues from `FILE.partial` if there is one, and keeps it
+    /// if cancelled; see [`resume_volume`].
     ///
     /// # Errors
     ///
@@ -301,7 +307,7 @@ impl Solid {
     }
 }
 
-/// A file of voxels to be written.
+/// A voxel file to write.
 struct VoxelFile<'a> {
     path: &'a Path,
     format: Format,
@@ -329,7 +335,7 @@ impl VoxelFile<'_> {
     }
 }
 
-/// Asks `value` for the runs of every row of a slab. The centres lie in the box: no wrapping is needed.
+/// Fills the runs of every row of a slab by `value`. The centres lie in the box, so no wrapping is needed.
 fn fill_by_id<'a, T: Element>(
     grid: &VoxelGrid,
     z: usize,
@@ -353,7 +359,7 @@ fn fill_by_id<'a, T: Element>(
     });
 }
 
-/// Has the rows of a slab filled some at a time, shared among threads: `fill` gets the number of the first and the samples of each.
+/// Fills the rows of a slab in blocks, in parallel: `fill` gets the index of the first row and the samples of each.
 fn by_strips<T: Element>(
     grid: &VoxelGrid,
     channels: usize,
@@ -361,7 +367,11 @@ fn by_strips<T: Element>(
     fill: impl Fn(usize, ChunksExactMut<'_, T>) + Sync,
 ) {
     let [nx, ny, _] = grid.counts;
-    assert_eq!(slab.dim(), (ny, nx, channels), "the slab's shape is not the grid's");
+    assert_eq!(
+        slab.dim(),
+        (ny, nx, channels),
+        "the slab's shape differs from the grid's"
+    );
     if slab.is_empty() {
         return;
     }

@@ -1,4 +1,4 @@
-//! Meshes with a colour at each vertex: GLB for Blender and browsers, PLY for MeshLab.
+//! Files of meshes with a colour per vertex: GLB for Blender and browsers, PLY for MeshLab.
 
 use crate::file::glb::{Corners, Glb, alpha_mode};
 use crate::file::mesh_file::{check_indices, write_whole};
@@ -7,14 +7,17 @@ use crate::mesh::coloured_mesh::ColouredMesh;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes a coloured mesh as `.glb` or `.ply`, as the ending of the name says, whole or not at all. Colours are clamped to 0..1.
+/// Writes a coloured mesh as `.glb` or `.ply`, depending on the extension, completely or not at all. Colours are
+/// clamped to 0..1.
 ///
-/// PLY holds the positions in double precision and the encoded colours as bytes, no normals. GLB (glTF 2.0) holds positions and normals in single precision and colours in linear light, as its standard has them, in 16 bits; a
-/// vertex is there once for each normal it has.
+/// PLY holds the positions in double precision and the encoded colours as bytes, no normals. GLB (glTF 2.0) holds
+/// positions and normals in single precision and colours in linear light with 16 bits, as its standard requires; a
+/// vertex is repeated for each of its normals.
 ///
 /// # Errors
 ///
-/// [`MeshFileError::Format`] if the name ends otherwise; [`MeshFileError::Write`] if the file cannot be written, an index is out of range, colours or normals are missing, or there are no triangles.
+/// [`MeshFileError::Format`] for other extensions; [`MeshFileError::Write`] if the file cannot be written, an index is
+/// out of range, colours or normals are missing, or there are no triangles.
 ///
 /// # Examples
 ///

@@ -120,7 +120,8 @@ impl Glb {
 
     /// Writes the file: positions, normals, the other `attributes`, and the material's members beside its roughness.
     ///
-    /// Single precision loses a mesh far from the origin, so it is written about its centre and moved there by its node.
+    /// Single precision loses a mesh far from the origin, so it is written about its centre and moved there by its
+    /// node.
     #[allow(clippy::cast_possible_truncation, reason = "GLB is single precision")]
     pub(crate) fn write(
         mut self,

@@ -1,4 +1,4 @@
-//! Mesh files in and out: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
+//! Reading and writing mesh files: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -10,20 +10,22 @@ use crate::file::ply;
 use crate::file::stl;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// The mesh formats that are read and written.
+/// Mesh file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MeshFormat {
     /// Wavefront text; only positions and faces are read. Written with all digits.
     Obj,
-    /// Stereolithography; text or binary is found out on reading. Written as binary, in single precision: that is the format.
+    /// Stereolithography; text or binary is detected on reading. Written as binary, in single precision, as the format
+    /// requires.
     Stl,
-    /// Polygon file format; text or binary of either byte order is found out on reading. Written as little-endian binary, doubles.
+    /// Polygon file format; text or binary of either byte order is detected on reading. Written as little-endian
+    /// binary, doubles.
     Ply,
 }
 
 impl MeshFormat {
-    /// The format that a file name's ending stands for, in any case.
+    /// The format of a file name's extension, in any case.
     ///
     /// # Errors
     ///
@@ -46,11 +48,11 @@ impl MeshFormat {
         }
     }
 
-    /// The triangles in the bytes of a file of this format; `name` is what errors call it.
+    /// The triangles in the bytes of a file of this format; errors report it as `name`.
     ///
     /// # Errors
     ///
-    /// [`MeshFileError::Content`]: the place and the fault.
+    /// [`MeshFileError::Content`] states the place and the fault.
     ///
     /// ```
     /// # use stereology_shape::MeshFormat;
@@ -72,14 +74,16 @@ impl MeshFormat {
     }
 }
 
-/// Reads the triangles of a mesh file; the ending of its name tells the format. Faces with more corners are cut into triangles.
+/// Reads the triangles of a mesh file; the extension determines the format. Faces with more corners are cut into
+/// triangles.
 ///
-/// Vertices come as they are in the file: texture or normal seams of an OBJ do not split them, and [`ClosedMesh`](crate::ClosedMesh)
-/// welds equal positions and says so. An STL file has no shared vertices: equal positions are one vertex from the start.
+/// Vertices are those of the file: texture or normal seams of an OBJ do not split them, and
+/// [`ClosedMesh`](crate::ClosedMesh) welds equal positions and reports it. An STL file has no shared vertices, so equal
+/// positions become one vertex on reading.
 ///
 /// # Errors
 ///
-/// [`MeshFileError`]: the file, the place in it and the fault. A file that is cut short is never read in part.
+/// [`MeshFileError`] states the file, the place in it and the fault. A truncated file is never read in part.
 ///
 /// # Examples
 ///
@@ -103,14 +107,14 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> 
     format.parse(&bytes, path)
 }
 
-/// Writes triangles as a mesh file; the ending of its name tells the format. An existing file is replaced, and only by a whole one: the
-/// new file is written beside as `FILE.partial` and renamed.
+/// Writes triangles as a mesh file; the extension determines the format. An existing file is replaced only by a
+/// complete one: the new file is written beside it as `FILE.partial` and renamed.
 ///
 /// OBJ and PLY keep every bit of the positions; STL holds them in single precision.
 ///
 /// # Errors
 ///
-/// [`MeshFileError::Format`] if the name tells no format, [`MeshFileError::Write`] if the file cannot be written.
+/// [`MeshFileError::Format`] if the extension is unknown, [`MeshFileError::Write`] if the file cannot be written.
 ///
 /// ```
 /// # use stereology_shape::{TriangleMesh, read_mesh, write_mesh};
@@ -133,7 +137,7 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Mes
     })
 }
 
-/// Writes `FILE.partial` and renames it when it is whole.
+/// Writes `FILE.partial` and renames it when it is complete.
 pub(crate) fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
@@ -149,7 +153,7 @@ pub(crate) fn write_whole(
         std::fs::rename(&partial, path)
     };
     write().map_err(|source| {
-        // There is nobody to tell if the removal fails.
+        // A failure of the removal cannot be reported.
         let _ = std::fs::remove_file(&partial);
         MeshFileError::Write {
             path: path.to_owned(),
@@ -167,7 +171,7 @@ pub(crate) fn check_indices(mesh: &TriangleMesh) -> std::io::Result<()> {
     {
         None => Ok(()),
         Some(t) => {
-            let message = format!("triangle {t} names a vertex that is not among the {vertices} vertices");
+            let message = format!("triangle {t} refers to a vertex that is not among the {vertices} vertices");
             Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, message))
         }
     }

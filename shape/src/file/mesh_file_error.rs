@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFileError {
-    /// The name does not tell a format.
+    /// The extension is unknown.
     #[error("{}: mesh files end in .obj, .stl or .ply", path.display())]
     Format {
         /// The file.
@@ -23,7 +23,7 @@ pub enum MeshFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file cannot be written.
@@ -31,10 +31,10 @@ pub enum MeshFileError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file is not what its name says, broken or cut short.
+    /// The file is not of the named format, broken or truncated.
     #[error("{}: {place}: {fault}", path.display())]
     Content {
         /// The file.
@@ -75,16 +75,16 @@ impl std::fmt::Display for MeshFilePlace {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFileFault {
-    /// A coordinate is no number, not finite, or not there.
+    /// A coordinate is not a number, not finite, or missing.
     #[error("{word:?} is not a finite coordinate")]
     Coordinate {
-        /// What stands there; empty if nothing does.
+        /// The text there; empty if there is none.
         word: String,
     },
-    /// A face names a vertex that is not in the file.
+    /// A face refers to a vertex that is not in the file.
     #[error("{word:?} is not the index of one of the {vertices} vertices")]
     Index {
-        /// What stands there.
+        /// The text there.
         word: String,
         /// How many vertices the file has.
         vertices: usize,
@@ -95,30 +95,30 @@ pub enum MeshFileFault {
         /// How many it has.
         corners: usize,
     },
-    /// Something else was to come.
+    /// Something else was expected.
     #[error("expected {expected}, found {found:?}")]
     Expected {
-        /// What the format asks for.
+        /// What the format requires.
         expected: &'static str,
-        /// What stands there; empty at the end of the file.
+        /// The text there; empty at the end of the file.
         found: String,
     },
-    /// The file is shorter or longer than it says.
+    /// The file is shorter or longer than its header states.
     #[error(
-        "{triangles} triangles take {expected} bytes, but the file has {found}: it is cut short or not an STL file"
+        "{triangles} triangles take {expected} bytes, but the file has {found}: it is truncated or not an STL file"
     )]
     Length {
-        /// How many triangles the file says it has.
+        /// Number of triangles in its header.
         triangles: u32,
         /// Bytes they take.
         expected: u64,
-        /// Bytes there are.
+        /// Bytes in the file.
         found: u64,
     },
-    /// The PLY parser's own finding.
+    /// An error of the PLY parser.
     #[error("{message}")]
     Ply {
-        /// In its words.
+        /// Its message.
         message: String,
     },
     /// No faces.

@@ -8,7 +8,7 @@ use crate::file::mesh_file_error::{Fault, MeshFileFault, MeshFilePlace, coordina
 use crate::file::polygon::triangulate;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// A face as it stands in the file.
+/// A face of the file.
 struct Face {
     line: usize,
     /// Where its corners start in the list of all corners.
@@ -70,7 +70,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     Ok(TriangleMesh { vertices, triangles })
 }
 
-/// The vertex that `v`, `v/vt`, `v//vn` or `v/vt/vn` names: from 1 up, or from -1 down.
+/// The vertex of `v`, `v/vt`, `v//vn` or `v/vt/vn`: counted from 1, or backwards from -1.
 fn index(word: &str, before: usize, vertices: usize) -> Result<u32, MeshFileFault> {
     let number: Option<i64> = word.split('/').next().and_then(|v| v.parse().ok());
     let position = number.and_then(|i| match i {

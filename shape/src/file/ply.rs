@@ -10,7 +10,7 @@ use crate::file::mesh_file_error::{Fault, MeshFileFault, MeshFilePlace};
 use crate::file::polygon::triangulate;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// A vertex or a face, whichever its properties say.
+/// A vertex or a face, depending on its properties.
 struct Element {
     position: [f64; 3],
     corners: Option<Vec<u32>>,
@@ -99,7 +99,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     Ok(TriangleMesh { vertices, triangles })
 }
 
-/// The parser counts lines also in binary files, where they mean nothing: its message then names the element.
+/// The parser counts lines in binary files too, where they are meaningless; its message then names the element.
 fn fault(error: ParseError) -> Fault {
     let whole = error.to_string();
     let message = whole

@@ -1,4 +1,4 @@
-//! Points in text files: rows of x, y, z, as instruments and spreadsheets write them.
+//! Points in text files: rows of x, y, z, as written by instruments and spreadsheets.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use crate::file::mesh_file_error::{Fault, MeshFileError, MeshFileFault, MeshFile
 
 /// Reads points: the vertices of a mesh file (.obj, .stl, .ply), or the rows of a text file of any other name.
 ///
-/// A row is three numbers x, y, z, separated by commas, semicolons, tabs or blanks; what follows them (colours, normals) is left out. A first row of
-/// words is a header; if it names the columns x, y and z, those are taken. Empty rows and rows that begin with `#` or `//` are skipped, and so is
-/// the number of points that many .xyz and .pts files begin with.
+/// A row is three numbers x, y, z, separated by commas, semicolons, tabs or blanks; further columns (colours, normals)
+/// are ignored. A first row of words is a header; if it names columns x, y and z, those are used. Empty rows, rows that
+/// begin with `#` or `//`, and the number of points at the start of many .xyz and .pts files are skipped.
 ///
 /// # Errors
 ///
-/// [`MeshFileError`]: the file, the line and the fault.
+/// [`MeshFileError`] states the file, the line and the fault.
 ///
 /// # Examples
 ///
@@ -40,11 +40,11 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point3<f64>>, MeshFileE
     parse_points(&bytes, path)
 }
 
-/// The points in the bytes of a text file, as [`read_points`] reads it; `name` is what errors call it.
+/// The points in the bytes of a text file, as [`read_points`] reads it; errors report it as `name`.
 ///
 /// # Errors
 ///
-/// [`MeshFileError::Content`]: the line and the fault.
+/// [`MeshFileError::Content`] states the line and the fault.
 ///
 /// ```
 /// # use stereology_shape::parse_points;
@@ -68,13 +68,13 @@ fn rows(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Fault> {
             .count();
         let expected = MeshFileFault::Expected {
             expected: "text: rows of x, y, z (or a mesh file, .obj, .stl or .ply)",
-            found: "bytes that are no text".to_owned(),
+            found: "bytes that are not text".to_owned(),
         };
         (MeshFilePlace::Line(lines + 1), expected)
     })?;
     let mut columns = None;
     let mut points = Vec::new();
-    // A mark that some editors set before the first row.
+    // The byte order mark that some editors write.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -89,7 +89,7 @@ fn rows(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Fault> {
                 continue;
             }
             columns = Some(header(&words).unwrap_or([0, 1, 2]));
-            // A row that has a number is no header: not one is left out in silence.
+            // A row with a number is not a header, so no point is skipped silently.
             if words.iter().any(|word| word.parse::<f64>().is_ok()) {
                 points.push(point(&words, [0, 1, 2], number)?);
             }
@@ -134,7 +134,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is written is read, bit by bit, however it is separated and whatever else stands in the rows.
+        /// Written points are read bit for bit, with any separator and any further columns.
         #[test]
         fn rows_are_read(points in prop::collection::vec(prop::array::uniform3(-1e30..1e30_f64), 1..20), separator in prop_oneof![Just(","), Just(" ; "), Just("\t"), Just("   "), Just(", ")], head in prop_oneof![Just(""), Just("# a comment\n\n"), Just("\u{feff}"), Just("12\n"), Just("// a\n")], more in prop_oneof![Just(false), Just(true)]) {
             let mut text = head.to_owned();

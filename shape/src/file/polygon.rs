@@ -1,14 +1,15 @@
-//! Faces with more than three corners, cut into triangles.
+//! Triangulation of faces with more than three corners.
 
 use nalgebra::{Point3, Vector3};
 use robust::{Coord, orient2d};
 
 use crate::file::mesh_file_error::MeshFileFault;
 
-/// More corners than this in one face are refused: cutting costs their square.
+/// Faces with more corners are refused: the cost grows with the square of their number.
 const MOST_CORNERS: usize = 4096;
 
-/// Cuts a face into triangles that use its corners only and share its edges; concave faces too. `corners` are indices in range.
+/// Cuts a face, convex or concave, into triangles that use its corners only and share its edges. `corners` are indices
+/// in range.
 pub(crate) fn triangulate(
     corners: &[u32],
     vertices: &[Point3<f64>],
@@ -33,7 +34,7 @@ pub(crate) fn triangulate(
     Ok(())
 }
 
-/// The corners along the axis closest to the face's normal, counter-clockwise.
+/// The corners projected along the axis closest to the face's normal, counter-clockwise.
 fn project(corners: &[u32], vertices: &[Point3<f64>]) -> Vec<Coord<f64>> {
     let at = |i: usize| vertices[corners[i % corners.len()] as usize];
     // Newell's normal: the vector area of the polygon.
@@ -54,8 +55,8 @@ fn project(corners: &[u32], vertices: &[Point3<f64>]) -> Vec<Coord<f64>> {
         .collect()
 }
 
-/// The first corner that can be cut off: it turns left and no other corner lies in its triangle. A polygon that crosses itself may have
-/// none; then any corner goes, and the surface stays closed.
+/// The first corner that can be cut off: it turns left and no other corner lies in its triangle. A polygon that crosses
+/// itself may have none; then any corner is cut off, and the surface stays closed.
 fn find_ear(ring: &[usize], flat: &[Coord<f64>]) -> usize {
     let n = ring.len();
     let is_ear = |k: usize| {

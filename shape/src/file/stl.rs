@@ -13,7 +13,7 @@ const HEADER: usize = 80;
 const TRIANGLE: usize = 50;
 
 pub(crate) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    // Binary files may start with the word "solid" too; only they have the length that their count tells.
+    // Binary files may start with the word "solid" too; only they have the length given by their number of triangles.
     let count = bytes
         .get(HEADER..HEADER + 4)
         .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -51,7 +51,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
 fn parse_binary(records: &[u8]) -> Result<TriangleMesh, Fault> {
     let mut vertices = Vec::with_capacity(records.len() / TRIANGLE * 3);
     for (face, record) in records.chunks_exact(TRIANGLE).enumerate() {
-        // The first three numbers are the normal, which the corners tell anyway.
+        // The first three numbers are the normal, which follows from the corners.
         for corner in record[12..48].chunks_exact(12) {
             let number = |k: usize| {
                 f64::from(f32::from_le_bytes([
@@ -113,7 +113,7 @@ fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     }
     if !complete {
         let fault = MeshFileFault::Expected {
-            expected: "endsolid (the file is cut short)",
+            expected: "endsolid (the file is truncated)",
             found: String::new(),
         };
         return Err((MeshFilePlace::Line(last_line), fault));

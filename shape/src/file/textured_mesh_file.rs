@@ -1,4 +1,4 @@
-//! Meshes with a picture wrapped about them, as GLB.
+//! GLB files of meshes with a texture.
 
 use crate::file::glb::{Corners, Glb, alpha_mode};
 use crate::file::mesh_file::{check_indices, write_whole};
@@ -8,13 +8,16 @@ use crate::mesh::textured_mesh::TexturedMesh;
 use std::io;
 use std::path::Path;
 
-/// Writes a textured mesh as `.glb` (glTF 2.0), whole or not at all, its picture inside as PNG: RGB if all of it is seen, else RGBA, cut out where alpha is below one half.
+/// Writes a textured mesh as `.glb` (glTF 2.0), completely or not at all, with its texture inside as PNG: RGB if it is
+/// opaque, otherwise RGBA with a mask at alpha 0.5.
 ///
-/// Positions, normals and places in the picture are in single precision; a vertex is there once for each normal and place it has.
+/// Positions, normals and texture coordinates are in single precision; a vertex is repeated for each of its normals and
+/// texture coordinates.
 ///
 /// # Errors
 ///
-/// [`MeshFileError::Ending`] if the name ends otherwise; [`MeshFileError::Write`] if the file cannot be written, an index is out of range, places, normals or texels are missing, or there are no triangles.
+/// [`MeshFileError::Ending`] for other extensions; [`MeshFileError::Write`] if the file cannot be written, an index is
+/// out of range, texture coordinates, normals or texels are missing, or there are no triangles.
 ///
 /// # Examples
 ///

@@ -1,4 +1,5 @@
-//! A sphere that is edited by its control points, as the paper's particles were made (section 5.2): a rational quadratic surface.
+//! A sphere edited by its control points, as the paper's particles were made (section 5.2): a rational quadratic
+//! surface.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -7,11 +8,11 @@ use nalgebra::{Point3, Vector3, Vector4};
 use crate::mesh::index::index;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// Control points of a closed surface in rows from pole to pole, each row around the axis.
+/// Control points of a closed surface in rows from pole to pole; each row runs around the axis.
 ///
-/// A NURBS surface of degree 2 both ways with double knots: every second point of a row, and every second row, lies on the surface, and
-/// those between pull it. Rows are odd in number, at least 3; points around even, at least 4; the first and the last row are the poles,
-/// where all points of the row are the same.
+/// A NURBS surface of degree 2 along both axes with double knots: every second point of every second row lies on the
+/// surface, and the others attract it. The number of rows is odd, at least 3; the number of points per row is even, at
+/// least 4. The first and the last row are the poles, where all points of the row coincide.
 ///
 /// # Examples
 ///
@@ -30,7 +31,7 @@ pub struct ControlSphere {
     weights: Vec<Vec<f64>>,
 }
 
-/// Why control points make no closed surface.
+/// Why control points do not make a closed surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ControlSphereError {
@@ -62,12 +63,12 @@ pub enum ControlSphereError {
         /// The first point that differs.
         point: usize,
     },
-    /// The file is no JSON of this form.
+    /// The file is not JSON of this form.
     #[error(
         "expected {{\"control_points\": [[[x, y, z], ...], ...], \"weights\": [[w, ...], ...]}} (weights may be left out): {message}"
     )]
     Json {
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
 }
@@ -103,11 +104,11 @@ impl ControlSphere {
         Self { points, weights }
     }
 
-    /// From rows of control points, with the weights of the exact sphere where none are given.
+    /// From rows of control points, with the weights of the exact sphere if none are given.
     ///
     /// # Errors
     ///
-    /// [`ControlSphereError`] with the place.
+    /// [`ControlSphereError`] states the position.
     pub fn new(points: Vec<Vec<Point3<f64>>>, weights: Option<Vec<Vec<f64>>>) -> Result<Self, ControlSphereError> {
         let rows = points.len();
         let around = points.first().map_or(0, Vec::len);
@@ -144,7 +145,7 @@ impl ControlSphere {
     ///
     /// # Errors
     ///
-    /// [`ControlSphereError`] with the place.
+    /// [`ControlSphereError`] states the position.
     ///
     /// ```
     /// use stereology_shape::ControlSphere;
@@ -197,8 +198,8 @@ impl ControlSphere {
         &mut self.points
     }
 
-    /// The surface as triangles: `steps` (at least 2) for each quarter of the way around and half of the way from pole to pole, as a sphere of
-    /// 8 points a row has four arcs around and two up.
+    /// The surface as triangles: `steps` (at least 2) for each quarter of the way around and half of the way from pole
+    /// to pole, as a sphere of 8 points a row has four arcs around and two up.
     #[must_use]
     pub fn triangles(&self, steps: u32) -> TriangleMesh {
         let steps = steps.max(2) as usize;

@@ -1,4 +1,4 @@
-//! Meshes of the plain solids, centred at the origin: for bodies, for pictures and as known answers in tests.
+//! Meshes of simple solids, centred at the origin.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,9 +8,11 @@ use crate::mesh::index::index;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
 impl TriangleMesh {
-    /// Sphere of `diameter`: an icosahedron whose triangles are split in four `subdivisions` times (at most 10), all vertices on the sphere.
+    /// Sphere of `diameter`: an icosahedron whose triangles are split into four `subdivisions` times (at most 10); all
+    /// vertices are on the sphere.
     ///
-    /// `20 · 4^subdivisions` triangles; volume, surface and mean width converge from below with the square of the edge length.
+    /// `20 · 4^subdivisions` triangles; volume, surface and mean width converge from below with the square of the edge
+    /// length.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -48,7 +50,8 @@ impl TriangleMesh {
         Self { vertices, triangles }
     }
 
-    /// The unit sphere: an octahedron with its corners on the axes, whose triangles are split in four `subdivisions` times.
+    /// The unit sphere: an octahedron with its corners on the axes, whose triangles are split into four `subdivisions`
+    /// times.
     pub(crate) fn octasphere(subdivisions: u32) -> Self {
         let mut directions = vec![
             Vector3::x(),
@@ -62,7 +65,7 @@ impl TriangleMesh {
         for octant in 0..8_u32 {
             let corner = |axis: u32| 2 * axis + (octant >> axis & 1);
             let [x, y, z] = [0, 1, 2].map(corner);
-            // An odd number of mirrored axes turns the triangle over.
+            // An odd number of mirrored axes reverses the triangle.
             triangles.push(if octant.count_ones() % 2 == 0 {
                 [x, y, z]
             } else {
@@ -106,8 +109,8 @@ impl TriangleMesh {
         Self { vertices, triangles }
     }
 
-    /// Upright cylinder along z: a prism of `sides` (at least 3) sides whose cross-section has the **area of the circle** of
-    /// `diameter`, so its volume is the cylinder's. `4 sides - 4` triangles.
+    /// Upright cylinder along z: a prism of `sides` (at least 3) sides whose cross-section has the **area of the
+    /// circle** of `diameter`, so its volume is the cylinder's. `4 sides - 4` triangles.
     ///
     /// ```
     /// # use stereology_shape::{ClosedMesh, TriangleMesh};
@@ -138,8 +141,8 @@ impl TriangleMesh {
         Self { vertices, triangles }
     }
 
-    /// Torus about z: circles of `tube_diameter` whose centres run on a circle of `ring_diameter`; all vertices on the torus,
-    /// `around` (at least 3) steps about z and `across` (at least 3) about the tube.
+    /// Torus about z: circles of `tube_diameter` whose centres run on a circle of `ring_diameter`; all vertices on the
+    /// torus, `around` (at least 3) steps about z and `across` (at least 3) about the tube.
     ///
     /// ```
     /// # use stereology_shape::{ClosedMesh, TriangleMesh};
@@ -172,7 +175,7 @@ impl TriangleMesh {
     }
 }
 
-/// Splits each triangle at the middles of its edges, pushed out to the unit sphere.
+/// Splits each triangle at the midpoints of its edges, moved to the unit sphere.
 fn split_in_four(directions: &mut Vec<Vector3<f64>>, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut edges: Vec<(u32, u32)> = triangles
         .iter()

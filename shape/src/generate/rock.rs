@@ -1,4 +1,4 @@
-//! Random rocks: angular convex chips such as crushed stone, one for every seed.
+//! Random rocks: angular convex fragments like crushed stone, one per seed.
 
 use nalgebra::{Point3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -14,11 +14,11 @@ use crate::mesh::mesh_error::MeshError;
 
 /// A convex rock of 16 to 38 triangular faces, about one unit across; the same mesh for the same seed.
 ///
-/// Hull of 11 to 21 points spread over an ellipsoid of random proportions (1 : 0.7–0.95 : 0.5–0.85) and pulled in at random, so faces
-/// differ in size as those of crushed stone do.
+/// The hull of 11 to 21 points spread over an ellipsoid of random proportions (1 : 0.7–0.95 : 0.5–0.85) and moved
+/// inwards at random, so that faces differ in size like those of crushed stone.
 pub(crate) fn rock(seed: u64) -> ClosedMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // Points pulled inside the hull of the others may leave too few faces: draw again.
+    // Points moved inside the hull of the others may leave too few faces; then draw again.
     loop {
         match convex_hull(&chip(&mut rng)) {
             Ok(hull) if hull.triangles().len() >= 16 => return hull,
@@ -27,9 +27,10 @@ pub(crate) fn rock(seed: u64) -> ClosedMesh {
     }
 }
 
-/// The rock of a seed with a rough surface: its radius in every direction times exp(amplitude × g), g a random function of mean square 1.
+/// The rock of a seed with a rough surface: its radius in every direction times exp(amplitude × g), g a random function
+/// of mean square 1.
 ///
-/// 5,120 triangles; star-shaped, so it cannot cut through itself. Not convex as a rule.
+/// 5,120 triangles; star-shaped, so it cannot intersect itself. Usually not convex.
 pub(crate) fn rough_rock(seed: u64, amplitude: f64) -> Result<ClosedMesh, MeshError> {
     let smooth = rock(seed);
     let centre = smooth.centroid().coords;
@@ -44,7 +45,7 @@ pub(crate) fn rough_rock(seed: u64, amplitude: f64) -> Result<ClosedMesh, MeshEr
     rng.set_stream(1);
     let rough = Roughness::random(&mut rng);
     ClosedMesh::try_from(star(4, |u| {
-        // The first face that a ray from the centre meets.
+        // The first face hit by a ray from the centre.
         let reach = faces
             .iter()
             .map(|(normal, height)| (normal.dot(u), height))
@@ -55,7 +56,7 @@ pub(crate) fn rough_rock(seed: u64, amplitude: f64) -> Result<ClosedMesh, MeshEr
     }))
 }
 
-/// Points on an ellipsoid, each pulled in by up to 0.22 of its distance.
+/// Points on an ellipsoid, each moved inwards by up to 0.22 of its distance.
 fn chip(rng: &mut impl Rng) -> Vec<Point3<f64>> {
     let axes = Vector3::new(
         0.5,
@@ -72,7 +73,7 @@ fn chip(rng: &mut impl Rng) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// Of five random directions the one farthest from those taken: spread, but not evenly.
+/// Of five random directions, the one farthest from those already chosen: well spread, but not evenly.
 fn far_direction(rng: &mut impl Rng, taken: &[Vector3<f64>]) -> Vector3<f64> {
     let mut best = (f64::NEG_INFINITY, Vector3::z());
     for _ in 0..5 {

@@ -4,13 +4,13 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Degrees of the roughness: from bumps a third of the rock wide down to bumps of a twentieth.
+/// Degrees of the roughness: bumps from a third of the rock's width down to a twentieth.
 const DEGREES: std::ops::RangeInclusive<usize> = 3..=20;
 
-/// g(u) = Σ a_lm Y_lm(u), normal coefficients with the power of a degree falling as l^(−2 H − 1), H = 0.8: a self-affine surface. The mean
-/// square of g over the sphere has expectation 1.
+/// g(u) = Σ a_lm Y_lm(u), normal coefficients with the power of a degree decreasing as l^(−2 H − 1), H = 0.8: a
+/// self-affine surface. The mean square of g over the sphere has expectation 1.
 pub(crate) struct Roughness {
-    /// One for each (l, m), m from 0 to l: of cos mφ and of sin mφ.
+    /// One pair for each (l, m), m from 0 to l: the coefficients of cos mφ and of sin mφ.
     coefficients: Vec<[f64; 2]>,
 }
 
@@ -57,7 +57,8 @@ impl Roughness {
     }
 }
 
-/// Associated Legendre functions normalised so that Y_lm is orthonormal over the sphere, at l (l + 1) / 2 + m (Holmes & Featherstone 2002).
+/// Associated Legendre functions normalised so that Y_lm is orthonormal over the sphere, at l (l + 1) / 2 + m (Holmes &
+/// Featherstone 2002).
 fn legendre(highest: usize, z: f64) -> Vec<f64> {
     let at = |l: usize, m: usize| l * (l + 1) / 2 + m;
     let sine = ((1.0 - z) * (1.0 + z)).sqrt();

@@ -1,4 +1,4 @@
-//! Superellipsoids: one family from boxes over ellipsoids to octahedra and stars.
+//! Superellipsoids: one family that includes boxes, ellipsoids, octahedra and stars.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +7,11 @@ use crate::mesh::hull::convex_hull;
 use crate::mesh::mesh_error::MeshError;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// Times the icosphere behind a superellipsoid is split: 5,120 triangles; the octahedron behind a star once more: 8,192.
+/// Subdivisions of the icosphere behind a superellipsoid (5,120 triangles); the octahedron behind a star has one more
+/// (8,192).
 const SUBDIVISIONS: u32 = 4;
 
-/// Exponents between which surfaces can be told from their limits in double precision.
+/// Exponents for which surfaces differ from their limits in double precision.
 pub(crate) const EXPONENTS: std::ops::RangeInclusive<f64> = 0.05..=4.0;
 
 /// The superellipsoid with these semi-axes and exponents, as a mesh with its vertices on the surface.
@@ -37,7 +38,7 @@ pub(crate) fn superellipsoid(semi_axes: [f64; 3], exponents: [f64; 2]) -> Result
         let mesh = star(SUBDIVISIONS, radius);
         convex_hull(&mesh.vertices).map_err(|_| MeshError::ZeroVolume)
     } else {
-        // The ridges of a star lie in the planes of the axes, and so do edges of a split octahedron.
+        // The ridges of a star lie in the coordinate planes, as do edges of a subdivided octahedron.
         ClosedMesh::try_from(
             TriangleMesh::octasphere(SUBDIVISIONS + 1).mapped(|p| Point3::from(p.coords * radius(&p.coords))),
         )
@@ -53,7 +54,8 @@ fn log_of_sum(a: f64, b: f64) -> f64 {
     high + (low - high).exp().ln_1p()
 }
 
-/// The mesh with every direction from the origin scaled by `radius` of the direction: an icosphere pulled onto a star-shaped surface.
+/// The mesh with every direction from the origin scaled by `radius` of the direction: an icosphere mapped onto a
+/// star-shaped surface.
 pub(crate) fn star(subdivisions: u32, radius: impl Fn(&Vector3<f64>) -> f64) -> TriangleMesh {
     TriangleMesh::icosphere(2.0, subdivisions).mapped(|p| Point3::from(p.coords * radius(&p.coords)))
 }

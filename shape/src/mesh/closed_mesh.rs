@@ -1,4 +1,4 @@
-//! The mesh that encloses a solid: checked once, safe to measure ever after.
+//! Triangle meshes that enclose a solid, checked once.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,12 +10,13 @@ use crate::mesh::topology::{self, Neighbours};
 use crate::mesh::triangle_mesh::{TriangleMesh, flush_tiny};
 use crate::mesh::winding::ray_crossing;
 
-/// A closed, oriented, manifold triangle mesh with a volume; the only way to a section law.
+/// A closed, oriented, manifold triangle mesh that encloses a volume. Section laws need one.
 ///
-/// Every edge is shared by exactly two triangles that agree about the outside. Safe repairs are made and listed by
-/// [`repairs`](Self::repairs); anything else is refused with its place. The mesh may consist of several bodies that share no edge:
-/// one inside another is a cavity of it (its triangles face the cavity), bodies apart are one particle in several pieces, measured
-/// together. A surface that cuts through itself, or through another of its bodies, is refused with the place.
+/// Every edge is shared by exactly two triangles with consistent orientation. Safe repairs are made and listed by
+/// [`repairs`](Self::repairs); any other defect is an error that states its position. The mesh may consist of several
+/// bodies that share no edge: a body inside another is a cavity (its triangles face the cavity); separate bodies are
+/// one particle of several components, measured together. A surface that intersects itself or another of its bodies is
+/// an error that states the position.
 ///
 /// # Examples
 ///
@@ -49,14 +50,16 @@ pub struct ClosedMesh {
 impl TryFrom<TriangleMesh> for ClosedMesh {
     type Error = MeshError;
 
-    /// Checks, repairs what is safe, and measures. Cost: T log T, and the pairs of triangles whose boxes overlap.
+    /// Checks the mesh, makes safe repairs, and measures it. Cost: T log T, and the pairs of triangles whose bounding
+    /// boxes overlap.
     fn try_from(mesh: TriangleMesh) -> Result<Self, MeshError> {
         Self::welded_within(mesh, 0.0)
     }
 }
 
 impl ClosedMesh {
-    /// The mesh with vertices nearer than `tolerance` to each other joined ([`TriangleMesh::weld_within`]), then checked as by `try_from`.
+    /// The mesh with vertices nearer than `tolerance` to each other joined ([`TriangleMesh::weld_within`]), then
+    /// checked as by `try_from`.
     ///
     /// # Errors
     ///
@@ -65,7 +68,7 @@ impl ClosedMesh {
     /// ```
     /// use stereology_shape::{ClosedMesh, Repair, TriangleMesh};
     ///
-    /// // A cube of two halves whose seams do not quite meet.
+    /// // A cube of two halves whose seams do not match exactly.
     /// let cube = TriangleMesh::cuboid([1.0; 3]);
     /// let (mut one, mut two) = (cube.clone(), cube.mapped(|p| p * (1.0 + 1e-9)));
     /// two.triangles.drain(..6);
@@ -141,7 +144,8 @@ fn check_numbers(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Turns every body whose sign does not match its place: a body inside an odd number of others bounds a cavity. Returns how many.
+/// Reverses every body whose orientation does not match its nesting: a body inside an odd number of others bounds a
+/// cavity. Returns their number.
 fn turn_inside_out(mesh: &mut TriangleMesh, across: &mut Neighbours, parts: &[Vec<u32>]) -> usize {
     let boxes: Vec<_> = parts.iter().map(|part| bounding_box(mesh, part)).collect();
     let within =
@@ -178,7 +182,7 @@ fn bounding_box(mesh: &TriangleMesh, part: &[u32]) -> (Point3<f64>, Point3<f64>)
     corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)))
 }
 
-/// Surface, volume and centroid of a mesh that encloses one.
+/// Surface area, volume and centroid of a mesh that encloses a volume.
 fn solid(mesh: &TriangleMesh) -> Result<(f64, f64, Point3<f64>), MeshError> {
     let (low, high) = mesh.bounding_box().ok_or(MeshError::Empty)?;
     let extent = (high - low).max();
@@ -225,7 +229,7 @@ impl ClosedMesh {
         })
     }
 
-    /// The convex hull's own mesh, which needs no repair and no second hull.
+    /// The closed mesh of a convex hull, which needs no repair and is its own hull.
     pub(crate) fn from_hull(mesh: TriangleMesh) -> Result<Self, MeshError> {
         let neighbours = topology::neighbours(&mesh)?;
         let (surface_area, volume, centroid) = solid(&mesh)?;
@@ -245,7 +249,7 @@ impl ClosedMesh {
         })
     }
 
-    /// The mesh moved so that `centre` is at the origin, and scaled: the same triangles, measures scaled with it.
+    /// The mesh moved so that `centre` is at the origin, and scaled. The triangles stay; the measures are scaled.
     pub(crate) fn centred_and_scaled(&self, centre: &Point3<f64>, scale: f64) -> Self {
         let place = |p: &Point3<f64>| Point3::from((p - centre) * scale);
         Self {
@@ -262,7 +266,7 @@ impl ClosedMesh {
         }
     }
 
-    /// What was mended when the mesh was checked; empty if nothing was.
+    /// The repairs made when the mesh was checked; empty if there were none.
     ///
     /// ```
     /// # use stereology_shape::{ClosedMesh, Repair, TriangleMesh};
@@ -288,7 +292,7 @@ impl ClosedMesh {
         &self.mesh.triangles
     }
 
-    /// For each triangle, the triangles across its edges 0→1, 1→2, 2→0: what a walk along a section follows.
+    /// For each triangle, the triangles across its edges 0→1, 1→2, 2→0. Contours of sections follow them.
     #[must_use]
     pub fn neighbours(&self) -> &[[u32; 3]] {
         &self.neighbours
@@ -324,9 +328,10 @@ impl ClosedMesh {
         self.centroid
     }
 
-    /// Mean width (mean caliper diameter) of the convex hull: the mean over all directions of the distance between two touching planes.
+    /// Mean width (mean caliper diameter) of the convex hull: the mean over all directions of the distance between two
+    /// touching planes.
     ///
-    /// How often random planes hit the body at all: hits per unit of plane distance.
+    /// The mean number of parallel planes of unit spacing that meet the body.
     ///
     /// # Formula
     ///
@@ -338,21 +343,21 @@ impl ClosedMesh {
         self.mean_width
     }
 
-    /// The same sum over the mesh's own edges, concave angles negative: profiles less holes of random sections, per unit of plane
-    /// distance. Equal to [`mean_width`](Self::mean_width) if the body is convex.
+    /// The same sum over the mesh's own edges, concave angles negative: the mean of profiles minus holes over random
+    /// planes, per plane spacing. Equal to [`mean_width`](Self::mean_width) if the body is convex.
     #[must_use]
     pub fn signed_mean_width(&self) -> f64 {
         self.signed_mean_width
     }
 
-    /// Whether the mesh is one body that fills its convex hull (to one part in ten million of the volume, the dents that rounded
-    /// coordinates make).
+    /// Whether the mesh is one body that fills its convex hull, to one part in ten million of the volume: rounded
+    /// coordinates make dents of that order.
     #[must_use]
     pub fn is_convex(&self) -> bool {
         self.convex
     }
 
-    /// How far the body reaches from `centre`.
+    /// Distance from `centre` to the farthest point of the body.
     pub(crate) fn reach(&self, centre: &Point3<f64>) -> f64 {
         self.hull()
             .vertices
@@ -382,5 +387,5 @@ impl std::fmt::Debug for ClosedMesh {
     }
 }
 
-/// A mesh that misses at most this share of its hull's volume counts as convex.
+/// A mesh whose volume is below that of its hull by at most this fraction counts as convex.
 const CONVEX_VOLUME_TOLERANCE: f64 = 1e-7;

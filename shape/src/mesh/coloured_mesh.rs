@@ -18,20 +18,21 @@ use nalgebra::{Point3, Vector3};
 pub struct ColouredMesh {
     /// Its triangles.
     pub mesh: TriangleMesh,
-    /// Colour of each vertex, sRGB-encoded / 255, and its alpha: 1, or 0 where there is a hole.
+    /// Colour of each vertex, sRGB-encoded / 255, and its alpha: 1, or 0 in a hole.
     pub colours: Vec<[f32; 4]>,
     /// Unit normals at the corners of each triangle.
     pub normals: Vec<[Vector3<f64>; 3]>,
 }
 
 impl ColouredMesh {
-    /// Whether all of it is seen.
+    /// Whether no vertex is transparent.
     #[cfg(feature = "io")]
     pub(crate) fn is_opaque(&self) -> bool {
         self.colours.iter().all(|colour| colour[3] >= 1.0)
     }
 
-    /// A mesh without holes, with the colour that `colour` has at its vertices, and [`corner_normals`]. Indices must be in range.
+    /// A mesh without holes, with the values of `colour` at its vertices, and [`corner_normals`]. Indices must be in
+    /// range.
     #[must_use]
     pub fn new(mesh: TriangleMesh, colour: impl Fn(&Point3<f64>) -> [f32; 3]) -> Self {
         Self {

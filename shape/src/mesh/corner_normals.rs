@@ -1,4 +1,4 @@
-//! Normals for shading: smooth where faces nearly agree, sharp at creases.
+//! Normals for shading: smooth where neighbouring faces have similar normals, sharp at creases.
 
 use crate::mesh::triangle_mesh::TriangleMesh;
 use nalgebra::{Point3, Vector3};
@@ -6,13 +6,14 @@ use nalgebra::{Point3, Vector3};
 /// Faces that meet at less than this angle are one smooth surface: 35°.
 const SMOOTH_COSINE: f64 = 0.82;
 
-/// For each corner of each triangle the mean of the normals about its vertex that agree with the triangle's own to 35°, weighted by the angles there.
+/// For each corner of each triangle, the mean of the face normals around its vertex that are within 35° of the
+/// triangle's own, weighted by the angles at the vertex.
 ///
-/// Unit vectors; zero where a triangle has no area. Indices must be in range. Cost: linear in the triangles.
+/// Unit vectors; zero if a triangle has no area. Indices must be in range. Cost: linear in the triangles.
 ///
 /// # Examples
 ///
-/// A sphere is smooth: its normals are nearly its radii. The faces of a cube stay flat.
+/// A sphere is smooth: its normals are nearly radial. The faces of a cube stay flat.
 ///
 /// ```
 /// use stereology_shape::{TriangleMesh, corner_normals};

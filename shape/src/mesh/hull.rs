@@ -6,11 +6,11 @@ use crate::mesh::closed_mesh::ClosedMesh;
 use crate::mesh::mesh_error::MeshError;
 use crate::mesh::quickhull::{HullError, hull_mesh};
 
-/// Convex hull as a closed triangle mesh; its vertices are a subset of the points, bit for bit (but that coordinates
-/// below 1e-20 of the largest are zero).
+/// Convex hull as a closed triangle mesh; its vertices are a subset of the points, bit for bit (except that coordinates
+/// below 1e-20 of the largest become zero).
 ///
-/// Quickhull (Barber, Dobkin & Huhdanpaa 1996) whose every decision is the exact sign of a determinant (Shewchuk 1997): no point is
-/// outside the result, whatever the rounding. Cost: about n log n.
+/// Quickhull (Barber, Dobkin & Huhdanpaa 1996) in which every decision is the exact sign of a determinant (Shewchuk
+/// 1997), so no point is outside the result. Cost: about n log n.
 ///
 /// # Errors
 ///

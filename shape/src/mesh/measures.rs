@@ -1,4 +1,4 @@
-//! Volume, surface, centroid and mean width of a closed mesh, each an exact sum over its triangles or edges.
+//! Volume, surface, centroid and mean width of a closed mesh, as sums over its triangles or edges.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ pub(crate) fn double_area([a, b, c]: &[Point3<f64>; 3]) -> Vector3<f64> {
     (b - a).cross(&(c - a))
 }
 
-/// Signed volume and centroid; sums run about `reference`, so a mesh far from the origin loses no digits.
+/// Signed volume and centroid. Sums are taken about `reference`, so a mesh far from the origin loses no digits.
 pub(crate) fn volume_and_centroid(mesh: &TriangleMesh, reference: &Point3<f64>) -> (f64, Point3<f64>) {
     let mut volume = 0.0;
     let mut moment = Vector3::zeros();
@@ -40,8 +40,8 @@ pub(crate) fn surface_area(mesh: &TriangleMesh) -> f64 {
         .sum()
 }
 
-/// Unit normals. A triangle without area (three corners on a line) takes the normal of its neighbour across its longest edge, so the
-/// angles about it are those of the surface.
+/// Unit normals. A triangle without area (three corners on a line) takes the normal of its neighbour across its longest
+/// edge, so that edge angles remain those of the surface.
 pub(crate) fn normals(mesh: &TriangleMesh, across: &Neighbours) -> Vec<Vector3<f64>> {
     let mut normals: Vec<Option<Vector3<f64>>> = Vec::with_capacity(mesh.triangles.len());
     let mut without_area = Vec::new();
@@ -56,7 +56,7 @@ pub(crate) fn normals(mesh: &TriangleMesh, across: &Neighbours) -> Vec<Vector3<f
             normals.push(Some(area.normalize()));
         }
     }
-    // A row of triangles without area passes its neighbour's normal along, one triangle a round.
+    // A row of triangles without area passes its neighbour's normal along, one triangle per iteration.
     while !without_area.is_empty() {
         let before = without_area.len();
         without_area.retain(|&t| {
@@ -65,8 +65,8 @@ pub(crate) fn normals(mesh: &TriangleMesh, across: &Neighbours) -> Vec<Vector3<f
             normals[t].is_none()
         });
         if without_area.len() == before {
-            // Some lean on each other: two back to back along an edge of four vertices or more. One of them takes the normal of any neighbour
-            // that has one; its corners lie on a line, so all edges turn by the same angle.
+            // Some depend on each other: two back to back along an edge of four vertices or more. One of them takes the
+            // normal of any neighbour that has one; its corners lie on a line, so all edges turn by the same angle.
             let beside = |t: usize| across[t].iter().find_map(|&other| normals[other as usize]);
             let Some((place, normal)) = (0..before).find_map(|place| Some((place, beside(without_area[place])?)))
             else {
@@ -88,8 +88,8 @@ fn longest_edge(corners: &[Point3<f64>; 3]) -> (usize, f64) {
 
 /// H = (1/4π) Σ over edges of length × signed angle between the normals (convex positive, concave negative).
 ///
-/// Of a convex body this is the mean width (mean caliper diameter); of any closed mesh the mean number of profiles less holes of a
-/// section, per unit of plane distance.
+/// For a convex body this is the mean width (mean caliper diameter). For any closed mesh it is the mean of profiles
+/// minus holes over random planes, per plane spacing.
 pub(crate) fn signed_mean_width(mesh: &TriangleMesh, across: &Neighbours) -> f64 {
     let normals = normals(mesh, across);
     let mut sum = 0.0;
@@ -103,7 +103,7 @@ pub(crate) fn signed_mean_width(mesh: &TriangleMesh, across: &Neighbours) -> f64
             let length = edge.norm();
             if length > 0.0 {
                 let along = edge / length;
-                // The angle about the edge: a sliver's normal may be rounded out of the plane across it.
+                // The angle about the edge; rounding may tilt a sliver's normal out of the plane across the edge.
                 let sine = normals[t].cross(&normals[other]).dot(&along);
                 let cosine = normals[t].dot(&normals[other]) - normals[t].dot(&along) * normals[other].dot(&along);
                 sum += length * sine.atan2(cosine);

@@ -1,6 +1,6 @@
-//! Why triangles do not enclose a solid, and which repairs are safe.
+//! Why triangles do not enclose a solid, and which repairs were made.
 
-/// What was mended in a mesh when it was closed; indices and counts are of the mesh as given.
+/// A repair made when a mesh was checked. Indices and counts refer to the mesh as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Repair {
@@ -14,7 +14,7 @@ pub enum Repair {
         /// How many.
         count: usize,
     },
-    /// Vertices within the tolerance asked for of another were joined with it.
+    /// Vertices within the requested tolerance of another were joined with it.
     WeldedWithinTolerance {
         /// How many.
         count: usize,
@@ -24,7 +24,7 @@ pub enum Repair {
         /// How many.
         count: usize,
     },
-    /// Triangles that were there more than once were dropped.
+    /// Repeated triangles were dropped.
     DroppedDuplicates {
         /// How many.
         count: usize,
@@ -34,12 +34,12 @@ pub enum Repair {
         /// How many.
         count: usize,
     },
-    /// Triangles were turned to agree with their neighbours about the outside.
+    /// Triangles were reversed to match the orientation of their neighbours.
     TurnedTriangles {
         /// How many.
         count: usize,
     },
-    /// Whole bodies were inside out (or a cavity faced the wrong way) and were turned.
+    /// Whole bodies were inside out (or a cavity was oriented outwards) and were reversed.
     TurnedInsideOut {
         /// How many bodies.
         bodies: usize,
@@ -62,9 +62,9 @@ impl std::fmt::Display for Repair {
             Self::DroppedDuplicates { count } => write!(f, "{count} duplicate triangles were dropped"),
             Self::DroppedUnusedVertices { count } => write!(f, "{count} unused vertices were dropped"),
             Self::TurnedTriangles { count } => {
-                write!(f, "{count} triangles were turned to agree with their neighbours")
+                write!(f, "{count} triangles were reversed to match their neighbours")
             }
-            Self::TurnedInsideOut { bodies } => write!(f, "{bodies} bodies were inside out and were turned"),
+            Self::TurnedInsideOut { bodies } => write!(f, "{bodies} bodies were inside out and were reversed"),
         }
     }
 }
@@ -82,18 +82,18 @@ pub enum MeshError {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} (counted from 0) names vertex {index}, but there are only {vertices} vertices")]
+    /// A triangle refers to a missing vertex.
+    #[error("triangle {triangle} (counted from 0) refers to vertex {index}, but there are only {vertices} vertices")]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// The vertex it refers to.
         index: u32,
         /// How many vertices there are.
         vertices: usize,
     },
-    /// More triangles or vertices than 32-bit indices can tell apart.
-    #[error("the mesh has {triangles} triangles; at most {limit} are handled: simplify it first")]
+    /// More triangles or vertices than 32-bit indices can number.
+    #[error("the mesh has {triangles} triangles; at most {limit} are supported; simplify it first")]
     TooLarge {
         /// How many triangles.
         triangles: usize,
@@ -101,7 +101,7 @@ pub enum MeshError {
         limit: usize,
     },
     /// Coordinates too large or too small for volumes in double precision.
-    #[error("the mesh is {extent:e} long; lengths from 1e-60 to 1e60 are handled: choose another unit")]
+    #[error("the mesh is {extent:e} long; lengths from 1e-60 to 1e60 are supported; choose another unit")]
     Extent {
         /// Largest side of the bounding box.
         extent: f64,
@@ -136,17 +136,17 @@ pub enum MeshError {
         /// How many such edges there are.
         count: usize,
     },
-    /// The surface has no inside (a Klein bottle).
+    /// The surface has no inside, like a Klein bottle.
     #[error(
-        "the mesh has no consistent outside: following its triangles around comes back reversed at the edge from {from:?} to {to:?}"
+        "the mesh has no consistent orientation: neighbouring triangles contradict each other at the edge from {from:?} to {to:?}"
     )]
     NotOrientable {
-        /// One end of an edge where the sides contradict.
+        /// One end of an edge where the orientations contradict each other.
         from: [f64; 3],
         /// Its other end.
         to: [f64; 3],
     },
-    /// The surface cuts through itself: inside and outside mean nothing there.
+    /// The surface intersects itself, so inside and outside are undefined there.
     #[error(
         "the mesh cuts through itself: {count}{} pairs of triangles cross, the first are {} and {} (counted from 0) near {place:?}; unite \
          the overlapping parts (a boolean union in a mesh editor)",
@@ -157,7 +157,7 @@ pub enum MeshError {
         triangles: [usize; 2],
         /// Where they cross.
         place: [f64; 3],
-        /// How many pairs cross; the search ends at 1000.
+        /// Number of pairs that cross; the search stops at 1000.
         count: usize,
     },
     /// The triangles enclose no volume.

@@ -1,16 +1,18 @@
-//! Which points are chained together by steps shorter than a length: clusters, at whatever length in about n log n.
+//! Clusters of points chained by steps shorter than a given length, in about n log n for any length.
 
 use nalgebra::Point3;
 
 use crate::mesh::index::index;
 
-/// Points in a leaf of the tree: so few are compared one by one.
+/// Points in a leaf of the tree; these are compared one by one.
 const LEAF: usize = 8;
 
-/// For each point the lowest index of its cluster: the points that can be reached from it by steps shorter than `length`.
+/// For each point the lowest index in its cluster, the points that can be reached from it by steps shorter than
+/// `length`.
 ///
-/// Two branches of a tree of boxes are looked into together only while their boxes leave it open whether their points are near, and not once
-/// they are known to be of one cluster. So a length that joins everything costs no more than one that joins nothing.
+/// Two branches of a tree of boxes are compared only while their boxes do not decide whether their points are near, and
+/// never once they are known to belong to one cluster. So a length that joins all points costs no more than one that
+/// joins none.
 pub(crate) fn clusters(points: &[Point3<f64>], length: f64) -> Vec<u32> {
     if points.is_empty() {
         return Vec::new();
@@ -34,7 +36,7 @@ struct Branch {
     from: usize,
     to: usize,
     children: Option<[usize; 2]>,
-    /// All its points are known to be of one cluster.
+    /// All its points are known to belong to one cluster.
     united: bool,
 }
 
@@ -43,12 +45,12 @@ struct Search<'a> {
     length: f64,
     order: Vec<u32>,
     branches: Vec<Branch>,
-    /// A point of the same cluster with an index as low or lower.
+    /// A point of the same cluster with an equal or lower index.
     first: Vec<u32>,
 }
 
 impl Search<'_> {
-    /// Halves points at the middle of their box's longest side by number, down to leaves.
+    /// Splits points into halves of equal number along their box's longest side, down to leaves.
     fn grow(&mut self, from: usize, to: usize) -> usize {
         let start = self.points[self.order[from] as usize];
         let (low, high) = self.order[from..to].iter().fold((start, start), |(low, high), &i| {
@@ -81,7 +83,7 @@ impl Search<'_> {
 
     fn root(&mut self, mut i: u32) -> u32 {
         while self.first[i as usize] != i {
-            // Paths are halved on the way.
+            // Path halving.
             let next = self.first[self.first[i as usize] as usize];
             self.first[i as usize] = next;
             i = next;
@@ -104,7 +106,7 @@ impl Search<'_> {
         }
     }
 
-    /// Whether both branches are known to be of the same cluster.
+    /// Whether both branches are known to belong to the same cluster.
     fn are_one(&mut self, a: usize, b: usize) -> bool {
         self.branches[a].united && self.branches[b].united && {
             let (i, j) = (self.order[self.branches[a].from], self.order[self.branches[b].from]);
@@ -134,7 +136,7 @@ impl Search<'_> {
             return;
         }
         let (p, q) = (&self.branches[a], &self.branches[b]);
-        // Along each axis the gap between the boxes, and from end to end.
+        // Along each axis, the gap between the boxes.
         let gap = (q.low - p.high).sup(&(p.low - q.high)).map(|x| x.max(0.0));
         if gap.norm() >= self.length {
             return;
@@ -144,7 +146,7 @@ impl Search<'_> {
             self.unite_all(b);
             return self.unite(self.order[self.branches[a].from], self.order[self.branches[b].from]);
         }
-        // The larger box is opened.
+        // Descend into the larger box.
         let opens_a =
             q.children.is_none() || (p.children.is_some() && (p.high - p.low).norm() >= (q.high - q.low).norm());
         let (opened, other) = if opens_a { (a, b) } else { (b, a) };
@@ -173,7 +175,7 @@ mod tests {
     use nalgebra::Point3;
     use proptest::prelude::*;
 
-    /// Every pair compared.
+    /// Compares every pair.
     fn brute_force(points: &[Point3<f64>], length: f64) -> Vec<u32> {
         let mut first: Vec<u32> = (0..u32::try_from(points.len()).unwrap()).collect();
         loop {
@@ -192,7 +194,7 @@ mod tests {
     }
 
     proptest! {
-        /// Points on a grid, so that many distances are equal to each other and to the length; and anywhere.
+        /// Points on a grid, where many distances equal each other and the length, and points at random positions.
         #[test]
         fn clusters_are_those_of_all_pairs(
             points in prop::collection::vec(prop::array::uniform3(-8..8_i32), 1..120),
@@ -207,7 +209,7 @@ mod tests {
         }
     }
 
-    /// 100,000 points at lengths that join nothing, sheets, and everything. All pairs would be 5,000,000,000.
+    /// 100,000 points at lengths that join nothing, sheets, and everything. There are 5,000,000,000 pairs.
     #[test]
     fn any_length_is_quick() {
         let points: Vec<Point3<f64>> = (0..100_000_u32)

@@ -1,4 +1,4 @@
-//! Convex hull of points: quickhull with exact predicates, so that no set of points breaks it.
+//! Convex hull of points: quickhull with exact predicates, robust for any set of points.
 
 use nalgebra::Point3;
 use robust::orient3d;
@@ -23,7 +23,7 @@ pub enum HullError {
         /// Index of the point.
         point: usize,
     },
-    /// All points lie in one plane, on one line or in one place.
+    /// All points lie in one plane, on one line or at one position.
     #[error("the points lie in one plane: their hull has no volume")]
     Flat,
     /// The points span less than 1e-60 or more than 1e60 units.
@@ -31,7 +31,7 @@ pub enum HullError {
     Extent,
 }
 
-/// The hull's triangles alone.
+/// The triangles of the hull.
 pub(crate) fn hull_mesh(points: &[Point3<f64>]) -> Result<TriangleMesh, HullError> {
     if let Some(point) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
         return Err(HullError::NotFinite { point });
@@ -66,7 +66,7 @@ struct Face {
     alive: bool,
 }
 
-/// An edge between a face that is seen and one `beyond` that is not, of which it is edge number `side`.
+/// An edge between a visible face and an invisible one, `beyond`, of which it is edge number `side`.
 struct HorizonEdge {
     from: u32,
     to: u32,
@@ -77,7 +77,7 @@ struct HorizonEdge {
 struct Quickhull<'a> {
     points: &'a [Point3<f64>],
     faces: Vec<Face>,
-    /// Faces that may have points outside.
+    /// Faces that may have points outside them.
     pending: Vec<usize>,
     /// For a vertex of the current horizon: the new face whose base edge starts there.
     face_from: Vec<usize>,
@@ -118,7 +118,7 @@ impl<'a> Quickhull<'a> {
         orient3d(at(a), at(b), at(c), at(p)) < 0.0
     }
 
-    /// Lists `p` at the first of `faces` that it lies outside of; a point outside none is inside the hull.
+    /// Lists `p` at the first of `faces` that it lies outside of. A point outside no face is inside the hull.
     fn assign(&mut self, p: u32, faces: std::ops::Range<usize>) {
         if let Some(face) = faces.into_iter().find(|&face| self.sees(p, face)) {
             self.faces[face].outside.push(p);
@@ -156,7 +156,7 @@ impl<'a> Quickhull<'a> {
         self.pending.extend(new);
     }
 
-    /// Any point outside would do; the farthest keeps the hull small. Ties: the lowest index.
+    /// Any point outside is valid; the farthest keeps the hull small. Ties: the lowest index.
     fn farthest(&self, face: usize) -> u32 {
         let Face { corners, outside, .. } = &self.faces[face];
         let [a, b, c] = corners.map(|i| self.points[i as usize]);
@@ -171,7 +171,7 @@ impl<'a> Quickhull<'a> {
         best.1
     }
 
-    /// The faces that `apex` sees (marked dead), and the edges around them.
+    /// The faces visible from `apex` (marked dead), and the edges around them.
     fn horizon(&mut self, apex: u32, start: usize) -> (Vec<usize>, Vec<HorizonEdge>) {
         self.faces[start].alive = false;
         let mut visible = vec![start];
@@ -229,7 +229,7 @@ fn first_simplex(points: &[Point3<f64>]) -> Option<[u32; 4]> {
             coord(&points[d]),
         )
     };
-    // Rounding may have chosen badly among points nearly in a plane: then any point exactly off the plane will do.
+    // Among points nearly in a plane, rounding may have chosen one in it; then any point exactly off the plane serves.
     let d = if side(d) == 0.0 {
         (0..points.len()).find(|&i| side(i) != 0.0)?
     } else {

@@ -1,9 +1,10 @@
-//! Does a surface cut through itself? A tree of boxes finds the triangles that are near each other, exact signs of determinants tell
-//! which of them cross.
+//! Self-intersection of a surface: a tree of boxes finds triangles near each other, and exact signs of determinants
+//! decide which of them cross.
 //!
-//! Two triangles cross where their interiors meet: transversally, or in one plane over an area. What only touches (a vertex on a face,
-//! three corners on a line, an edge along another) encloses the same solid and is no crossing, and neither is what rounded
-//! coordinates do: one triangle has to stick out of the other by more than [`ROUNDING`].
+//! Two triangles cross if their interiors meet, transversally or over an area in one plane. Contact without crossing (a
+//! vertex on a face, three corners on a line, an edge along another) does not change the enclosed solid and is not a
+//! crossing. To exclude the effect of rounded coordinates, one triangle must extend through the other by more than
+//! [`ROUNDING`].
 
 use nalgebra::{Point2, Point3};
 use robust::{Coord, orient2d, orient3d};
@@ -14,16 +15,18 @@ use crate::mesh::topology::{Neighbours, known_neighbours};
 use crate::mesh::triangle_mesh::TriangleMesh;
 use crate::mesh::winding::coord;
 
-/// Crossings shallower than this part of the mesh's extent are rounding: files in single precision hold 24 bits.
+/// Crossings shallower than this fraction of the mesh's extent count as rounding: files in single precision hold 24
+/// bits.
 pub(crate) const ROUNDING: f64 = 1e-7;
 
-/// Heights above this share of the product of their lengths have the sign they seem to have: rounding is below 10⁻¹⁴ of it.
+/// Heights above this fraction of the product of their lengths have a reliable sign: rounding is below 10⁻¹⁴ of it.
 const FILTER: f64 = 1e-10;
 
-/// Enough crossings to say that a mesh is broken.
+/// The search stops at this number of crossings.
 const MOST: usize = 1000;
 
-/// Two triangles that cross, how many such pairs were found (the search stops at 1000), and a place on the first.
+/// Two triangles that cross, the number of such pairs found (the search stops at 1000), and a point on the first
+/// crossing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
     pub(crate) triangles: [usize; 2],
@@ -31,8 +34,12 @@ pub(crate) struct Crossing {
     pub(crate) count: usize,
 }
 
-/// How many pairs of triangles cross each other, where the search stops at 1000: 0 for a surface that does not cut through itself. Open surfaces and edges with more than two triangles are allowed; triangles beside each other are not asked. Exact
-/// signs of determinants, crossings shallower than 10⁻⁷ of the extent left out as rounding. Indices must be in range. Cost: T log T, and the pairs of triangles whose boxes overlap.
+/// Number of pairs of triangles that cross each other; the search stops at 1000. It is 0 for a surface that does not
+/// intersect itself.
+///
+/// Open surfaces and edges with more than two triangles are allowed; triangles that share an edge are not compared.
+/// Decisions are exact signs of determinants; crossings shallower than 10⁻⁷ of the extent are ignored as rounding.
+/// Indices must be in range. Cost: T log T, and the pairs of triangles whose boxes overlap.
 ///
 /// ```
 /// use stereology_shape::{TriangleMesh, self_intersections};
@@ -75,7 +82,7 @@ pub(crate) fn first_crossing(mesh: &TriangleMesh, across: &Neighbours) -> Option
 fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: f64) -> bool {
     let (one, two) = (mesh.triangles[t as usize], mesh.triangles[s as usize]);
     let shared = one.iter().filter(|v| two.contains(v)).count();
-    // Across a common edge the surface can only fold flat onto itself: a fin, which encloses nothing.
+    // Across a common edge the surface can only fold flat onto itself: a fin, which encloses no volume.
     if shared >= 2 {
         return false;
     }
@@ -102,7 +109,8 @@ fn cross(mesh: &TriangleMesh, across: &Neighbours, [t, s]: [u32; 2], tolerance: 
     edge_passes(mesh, across, t, &sides_a, &b, tolerance) || edge_passes(mesh, across, s, &sides_b, &a, tolerance)
 }
 
-/// Do all corners but shared ones lie on one side of a plane, farther off than the tolerance and any rounding? Then nothing crosses: what is in the plane besides a shared corner belongs to the other triangle alone. Most pairs of neighbours are that simple.
+/// Whether all corners except shared ones lie on one side of a plane, farther from it than the tolerance and any
+/// rounding. Then the triangles do not cross. This decides most pairs of neighbours.
 fn clearly_beside(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3], tolerance: f64) -> bool {
     let [u, v] = [plane[1] - plane[0], plane[2] - plane[0]];
     let normal = u.cross(&v);
@@ -122,10 +130,10 @@ fn clearly_beside(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3], toleranc
     side != 0.0
 }
 
-/// On which side of the plane of `plane` each corner lies: 1 where its normal points, -1, or 0; exact.
+/// The side of the plane of `plane` on which each corner lies, exactly: 1 for the side of its normal, -1, or 0.
 fn sides(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3]) -> [i8; 3] {
     corners.map(|p| {
-        // A shared corner is the common case, and the slowest for the predicate.
+        // Shared corners are common, and the slowest case of the predicate.
         if plane.contains(&p) {
             return 0;
         }
@@ -152,7 +160,7 @@ fn heights(corners: &[Point3<f64>; 3], plane: &[Point3<f64>; 3]) -> [f64; 3] {
     corners.map(|p| normal.dot(&(p - plane[0])))
 }
 
-/// How far the smaller part lies beyond the plane.
+/// How far the smaller part extends beyond the plane.
 fn sticks_out(heights: &[f64; 3]) -> f64 {
     let (up, down) = heights
         .iter()
@@ -160,9 +168,10 @@ fn sticks_out(heights: &[f64; 3]) -> f64 {
     up.min(down)
 }
 
-/// Do the interiors of two triangles in different planes meet? Exact (Guigue & Devillers 2003).
+/// Whether the interiors of two triangles in different planes meet; exact (Guigue & Devillers 2003).
 ///
-/// Each triangle cuts the line common to both planes in an interval; the order of its ends is the sign of a determinant of four corners.
+/// Each triangle meets the line common to both planes in an interval. The order of the ends is the sign of a
+/// determinant of four corners.
 fn interiors_cross(a: &[Point3<f64>; 3], sides_a: &[i8; 3], b: &[Point3<f64>; 3], sides_b: &[i8; 3]) -> bool {
     let (Some(i), Some(j)) = (lone(sides_a), lone(sides_b)) else {
         return false;
@@ -175,11 +184,12 @@ fn interiors_cross(a: &[Point3<f64>; 3], sides_a: &[i8; 3], b: &[Point3<f64>; 3]
     if sides_b[j] < 0 {
         std::mem::swap(&mut q1, &mut r1);
     }
-    // The ends on the edges p1 q1 and p2 q2, and those on p1 r1 and p2 r2, are in this order along the line iff the intervals overlap.
+    // The ends on the edges p1 q1 and p2 q2, and those on p1 r1 and p2 r2, are in this order along the line iff the
+    // intervals overlap.
     side(&q2, &[p1, q1, p2]) < 0 && side(&r2, &[p1, r1, p2]) > 0
 }
 
-/// The corner that has a side for itself, of a triangle with corners strictly on both sides.
+/// The corner that is alone on its side, for a triangle with corners strictly on both sides.
 fn lone(sides: &[i8; 3]) -> Option<usize> {
     let on = |side: i8| sides.iter().filter(|&&s| s == side).count();
     match (on(1), on(-1)) {
@@ -189,7 +199,7 @@ fn lone(sides: &[i8; 3]) -> Option<usize> {
     }
 }
 
-/// Does an edge of triangle `t` lie in the face `b`, with the surface on different sides of it?
+/// Whether an edge of triangle `t` lies in the face `b`, with the surface on both sides of it.
 fn edge_passes(
     mesh: &TriangleMesh,
     across: &Neighbours,
@@ -203,7 +213,7 @@ fn edge_passes(
     };
     let corners = mesh.triangles[t as usize];
     let (from, to) = (corners[(free + 1) % 3], corners[(free + 2) % 3]);
-    // Nothing lies beyond a border.
+    // There is no surface beyond a border.
     let Some(beyond) = mesh.triangles.get(across[t as usize][(free + 1) % 3] as usize) else {
         return false;
     };
@@ -218,7 +228,7 @@ fn edge_passes(
         && flat_interiors_meet(&[from, to].map(|v| mesh.vertices[v as usize]), b)
 }
 
-/// Do a segment and a triangle in one plane meet in the triangle's interior? Exact.
+/// Whether a segment and a triangle in one plane meet in the triangle's interior; exact.
 fn flat_interiors_meet(segment: &[Point3<f64>; 2], triangle: &[Point3<f64>; 3]) -> bool {
     let axis = double_area(triangle).iamax();
     let flat = |p: &Point3<f64>| Coord {
@@ -239,7 +249,8 @@ fn flat_interiors_meet(segment: &[Point3<f64>; 2], triangle: &[Point3<f64>; 3]) 
     turn != 0 && !apart_by_triangle && !apart_by_segment
 }
 
-/// How far one of two triangles in (nearly) one plane would have to move for them not to overlap; zero or less if they do not.
+/// The distance by which one of two triangles in (nearly) one plane must move to end their overlap; zero or less if
+/// they do not overlap.
 fn flat_overlap(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> f64 {
     let (of_a, of_b) = (double_area(a), double_area(b));
     let normal = if of_a.norm_squared() > of_b.norm_squared() {
@@ -248,7 +259,7 @@ fn flat_overlap(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> f64 {
         of_b
     };
     let axis = normal.iamax();
-    // Projected along an axis lengths shrink, but to no less than 1 / √3 of the larger.
+    // Projection along an axis shrinks lengths to no less than 1 / √3.
     let flat = |p: &Point3<f64>| {
         Point2::new(
             p[(axis + 1) % 3] - a[0][(axis + 1) % 3],
@@ -275,7 +286,8 @@ fn flat_overlap(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> f64 {
     least
 }
 
-/// A point on the crossing, for people to look at: where an edge of one passes the other's plane, nearest to its middle.
+/// A point on the crossing, for error messages: where an edge of one triangle passes the other's plane, nearest to that
+/// triangle's middle.
 fn meeting_place(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> Point3<f64> {
     let mut best = (f64::INFINITY, a[0]);
     for (from, plane) in [(a, b), (b, a)] {
@@ -295,7 +307,7 @@ fn meeting_place(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> Point3<f64> {
     best.1
 }
 
-/// Boxes in boxes around the triangles.
+/// A tree of bounding boxes of the triangles.
 struct Boxes {
     nodes: Vec<Node>,
     order: Vec<u32>,
@@ -306,9 +318,9 @@ struct Boxes {
 struct Node {
     low: Point3<f64>,
     high: Point3<f64>,
-    /// First triangle of a leaf in `order`; or the second half (the first follows its parent).
+    /// First triangle of a leaf in `order`, or the second child of an inner node (the first follows its parent).
     start: u32,
-    /// Triangles of a leaf, 0 for an inner node.
+    /// Number of triangles of a leaf, 0 for an inner node.
     count: u32,
 }
 
@@ -469,7 +481,8 @@ mod tests {
     }
 
     proptest! {
-        /// Two balls cross exactly if their distance is below the sum of their radii and above the difference, at any scale and offset.
+        /// Two balls cross exactly if their distance is below the sum of their radii and above the difference, at any
+        /// scale and offset.
         #[test]
         fn balls_cross_where_they_overlap(distance in 0.05..1.6_f64, small in 0.2..0.6_f64, turn in prop::array::uniform3(-3.0..3.0_f64), scale in -20..20_i32) {
             prop_assume!((distance - (0.5 + 0.5 * small)).abs() > 0.03 && (distance - (0.5 - 0.5 * small)).abs() > 0.03);

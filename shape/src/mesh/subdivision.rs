@@ -1,4 +1,4 @@
-//! Finer meshes from coarse ones: every triangle in four, flat or rounded.
+//! Subdivision of meshes: every triangle becomes four, flat or smoothed.
 
 use std::f64::consts::TAU;
 
@@ -8,21 +8,21 @@ use crate::mesh::closed_mesh::ClosedMesh;
 use crate::mesh::index::index;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// How a mesh is made finer.
+/// Subdivision scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subdivision {
-    /// Triangles are split at the middles of their edges: the same solid.
+    /// Triangles are split at the midpoints of their edges. The solid stays the same.
     Midpoint,
-    /// Loop's scheme (1987): vertices move to smooth averages; the limit has no edges (curvature is continuous but at vertices with
-    /// other than six neighbours).
+    /// Loop's scheme (1987): vertices move to smooth averages; the limit surface is smooth (its curvature is continuous
+    /// except at vertices without exactly six neighbours).
     Loop,
 }
 
 impl ClosedMesh {
-    /// The mesh with every triangle split in four, `times` over.
+    /// The mesh with every triangle split in four, repeated `times` times.
     ///
-    /// Triangles, not a closed mesh: averaging may make a surface that all but touches itself cross itself. Check it again by
-    /// `ClosedMesh::try_from`. Cost: T 4^times log.
+    /// The result is a plain triangle mesh: averaging may make a surface that nearly touches itself intersect itself.
+    /// Check it with `ClosedMesh::try_from`. Cost: T 4^times log.
     ///
     /// ```
     /// use stereology_shape::{ClosedMesh, Subdivision, TriangleMesh};
@@ -57,7 +57,7 @@ fn split(mesh: &TriangleMesh, scheme: Subdivision) -> TriangleMesh {
         .collect();
     sides.sort_unstable();
     let at = |v: u32| mesh.vertices[v as usize].coords;
-    // A closed mesh has two sides an edge, beside each other in the list.
+    // A closed mesh has two sides per edge, next to each other in the list.
     let edges: Vec<[Side; 2]> = sides.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
     let mut vertices = match scheme {
         Subdivision::Midpoint => mesh.vertices.clone(),
@@ -85,7 +85,7 @@ fn split(mesh: &TriangleMesh, scheme: Subdivision) -> TriangleMesh {
     TriangleMesh { vertices, triangles }
 }
 
-/// Every vertex drawn towards the mean of its neighbours by Loop's weight.
+/// Every vertex moved towards the mean of its neighbours by Loop's weight.
 fn smoothed(mesh: &TriangleMesh, edges: &[[Side; 2]]) -> Vec<Point3<f64>> {
     let mut sums = vec![(Vector3::zeros(), 0_u32); mesh.vertices.len()];
     for &[(a, b, _), _] in edges {
@@ -118,7 +118,8 @@ mod tests {
         assert_relative_eq!(fine.signed_mean_width(), ring.signed_mean_width(), max_relative = 1e-9);
     }
 
-    /// Loop's scheme reproduces planes and keeps symmetric bodies symmetric: the limit of a tetrahedron is centred where it was.
+    /// Loop's scheme reproduces planes and keeps symmetric bodies symmetric: the limit of a tetrahedron is centred
+    /// where it was.
     #[test]
     fn loop_keeps_centre_and_topology() {
         let ring = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.8, 12, 8)).unwrap();

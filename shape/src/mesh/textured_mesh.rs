@@ -1,9 +1,9 @@
-//! A mesh with a picture wrapped about it.
+//! A mesh with a texture image.
 
 use crate::mesh::triangle_mesh::TriangleMesh;
 use nalgebra::Vector3;
 
-/// Triangles, where their corners are in a picture, and the normals to shade them with.
+/// Triangles, the texture coordinates of their corners, and the normals to shade them with.
 ///
 /// # Examples
 ///
@@ -23,15 +23,16 @@ use nalgebra::Vector3;
 pub struct TexturedMesh {
     /// Its triangles.
     pub mesh: TriangleMesh,
-    /// Where the corners of each triangle are in the picture: shares of its width from the left and of its height from the top.
+    /// Texture coordinates of the corners of each triangle: fractions of the image's width from the left and of its
+    /// height from the top.
     pub uvs: Vec<[[f64; 2]; 3]>,
     /// Unit normals at the corners of each triangle.
     pub normals: Vec<[Vector3<f64>; 3]>,
-    /// The picture.
+    /// The texture image.
     pub texture: Texture,
 }
 
-/// A picture of colours and alpha.
+/// An image with colours and alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     /// Texels in a row.
@@ -43,7 +44,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Whether all of it is seen.
+    /// Whether no texel is transparent.
     #[must_use]
     pub fn is_opaque(&self) -> bool {
         self.rgba.chunks_exact(4).all(|texel| texel[3] == u8::MAX)

@@ -1,4 +1,4 @@
-//! Which triangles share which edges, and whether they agree about the outside.
+//! Which triangles share which edges, and whether their orientations agree.
 
 use crate::mesh::index::index;
 use crate::mesh::mesh_error::MeshError;
@@ -7,7 +7,7 @@ use crate::mesh::triangle_mesh::TriangleMesh;
 /// For each triangle, the triangle across its edges 0→1, 1→2, 2→0.
 pub(crate) type Neighbours = Vec<[u32; 3]>;
 
-/// One side of an edge: the edge's vertices (lower first) and where it is found.
+/// One side of an edge: the edge's vertices (lower first) and the triangle and corner where it starts.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
     edge: (u32, u32),
@@ -15,7 +15,7 @@ struct Side {
     corner: u8,
 }
 
-/// All sides in order: by the lower vertex by counting, then each vertex's few among themselves.
+/// All sides, sorted: a counting sort by the lower vertex, then a sort of each vertex's few sides.
 fn sorted_sides(mesh: &TriangleMesh) -> Vec<Side> {
     let vertices = mesh
         .triangles
@@ -58,11 +58,12 @@ fn sorted_sides(mesh: &TriangleMesh) -> Vec<Side> {
     sides
 }
 
-/// Pairs the triangles over their edges.
+/// Pairs the triangles across their edges.
 ///
 /// # Errors
 ///
-/// The first edge with one side ([`MeshError::OpenEdge`]) or with more than two ([`MeshError::NonManifoldEdge`]), and their number.
+/// The first edge with one side ([`MeshError::OpenEdge`]) or with more than two ([`MeshError::NonManifoldEdge`]), and
+/// their number.
 pub(crate) fn neighbours(mesh: &TriangleMesh) -> Result<Neighbours, MeshError> {
     let sides = sorted_sides(mesh);
     let mut across = vec![[u32::MAX; 3]; mesh.triangles.len()];
@@ -102,7 +103,7 @@ pub(crate) fn neighbours(mesh: &TriangleMesh) -> Result<Neighbours, MeshError> {
     Ok(across)
 }
 
-/// Pairs the triangles over the edges that have exactly two; none (`u32::MAX`) over others.
+/// Pairs the triangles across edges that have exactly two; `u32::MAX` across other edges.
 pub(crate) fn known_neighbours(mesh: &TriangleMesh) -> Neighbours {
     let mut across = vec![[u32::MAX; 3]; mesh.triangles.len()];
     for group in sorted_sides(mesh).chunk_by(|a, b| a.edge == b.edge) {
@@ -114,7 +115,7 @@ pub(crate) fn known_neighbours(mesh: &TriangleMesh) -> Neighbours {
     across
 }
 
-/// The connected bodies of the mesh's surface, each a list of triangles in order of its lowest triangle.
+/// The connected components of the surface, each a list of triangles, ordered by their lowest triangle.
 pub(crate) fn components(across: &Neighbours) -> Vec<Vec<u32>> {
     let mut seen = vec![false; across.len()];
     let mut parts = Vec::new();
@@ -138,19 +139,19 @@ pub(crate) fn components(across: &Neighbours) -> Vec<Vec<u32>> {
     parts
 }
 
-/// Turns triangles so that neighbours agree about the outside (the fewer of each part are turned); returns how many were turned.
-/// `across` stays true to the turned triangles.
+/// Reverses triangles so that neighbours have the same orientation (the minority of each component is reversed);
+/// returns their number. `across` is updated.
 ///
 /// # Errors
 ///
-/// [`MeshError::NotOrientable`] if no choice agrees (a Klein bottle).
+/// [`MeshError::NotOrientable`] if no choice is consistent (a Klein bottle).
 pub(crate) fn orient(mesh: &mut TriangleMesh, across: &mut Neighbours, parts: &[Vec<u32>]) -> Result<usize, MeshError> {
-    // None: not reached yet. Some(true): to be turned, if the part's first triangle stays.
+    // None: not reached yet. Some(true): to be reversed if the component's first triangle stays.
     let mut turned: Vec<Option<bool>> = vec![None; mesh.triangles.len()];
     let mut total = 0;
     for part in parts {
         turned[part[0] as usize] = Some(false);
-        // Parts are listed breadth first, so the triangle before is always decided.
+        // Components are listed breadth first, so the previous triangle is always decided.
         for &t in part {
             let t = t as usize;
             let own = turned[t].expect("a part lists its triangles breadth first");
@@ -188,7 +189,7 @@ pub(crate) fn orient(mesh: &mut TriangleMesh, across: &mut Neighbours, parts: &[
     Ok(total)
 }
 
-/// Reverses triangle `t` and keeps its neighbours beside their edges.
+/// Reverses triangle `t` and keeps its list of neighbours in the order of its edges.
 pub(crate) fn turn(mesh: &mut TriangleMesh, across: &mut Neighbours, t: usize) {
     mesh.triangles[t].swap(1, 2);
     across[t].swap(0, 2);
@@ -205,8 +206,8 @@ pub(crate) fn drop_degenerate(mesh: &mut TriangleMesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Drops triangles that are there more than once, keeping one where the surface needs it to stay closed (a flap of two goes
-/// altogether); returns how many went.
+/// Drops triangles that are there more than once, keeping one where the surface needs it to stay closed (a flap of two
+/// goes altogether); returns how many went.
 pub(crate) fn drop_duplicates(mesh: &mut TriangleMesh) -> usize {
     let mut order: Vec<([u32; 3], u32)> = Vec::with_capacity(mesh.triangles.len());
     for (t, corners) in mesh.triangles.iter().enumerate() {

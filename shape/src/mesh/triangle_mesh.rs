@@ -1,13 +1,13 @@
-//! Any triangles at all: what a file holds and what a picture needs, with no promise about the solid they may enclose.
+//! Arbitrary triangles, as in a mesh file. They need not enclose a solid.
 
 use nalgebra::Point3;
 
 use crate::mesh::index::index;
 use crate::mesh::near_points::clusters;
 
-/// Vertices and triangles as a file holds them: open, inverted or broken meshes too.
+/// Vertices and triangles as stored in files; the mesh may be open, inverted or broken.
 ///
-/// [`ClosedMesh`](crate::ClosedMesh) is the checked kind that encloses a solid.
+/// A [`ClosedMesh`](crate::ClosedMesh) is checked to enclose a solid.
 ///
 /// # Examples
 ///
@@ -28,7 +28,7 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Lowest and highest corner of the box parallel to the axes that holds all vertices; `None` without vertices.
+    /// Lowest and highest corner of the axis-aligned bounding box; `None` without vertices.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -45,7 +45,7 @@ impl TriangleMesh {
         )
     }
 
-    /// The mesh with every vertex moved by `place`; a mirroring map turns the mesh inside out.
+    /// The mesh with every vertex mapped by `place`; a reflection turns the mesh inside out.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -60,7 +60,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Both meshes in one list; nothing is welded or joined.
+    /// Both meshes in one; no vertices are welded.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -76,7 +76,7 @@ impl TriangleMesh {
         self
     }
 
-    /// Gives vertices at exactly equal positions one index (0 and -0 are equal); returns how many vertices went.
+    /// Merges vertices at exactly equal positions (0 and -0 are equal); returns the number of vertices removed.
     ///
     /// The kept vertices keep their order. Cost: V log V.
     ///
@@ -95,7 +95,7 @@ impl TriangleMesh {
             let compare = |k: usize| pa[k].total_cmp(&pb[k]);
             compare(0).then(compare(1)).then(compare(2)).then(a.cmp(&b))
         });
-        // `first[i]`: the lowest index of a vertex at the place of vertex i.
+        // `first[i]`: the lowest index of a vertex at the position of vertex i.
         let mut first: Vec<u32> = (0..index(self.vertices.len())).collect();
         for pair in order.windows(2) {
             if self.vertices[pair[0] as usize] == self.vertices[pair[1] as usize] {
@@ -105,11 +105,11 @@ impl TriangleMesh {
         self.keep_vertices(&first)
     }
 
-    /// Gives vertices nearer than `tolerance` to each other one index, and the position of the first of them; chains of near vertices
-    /// become one. Returns how many vertices went.
+    /// Merges vertices nearer than `tolerance` to each other at the position of the first of them; chains of near
+    /// vertices become one vertex. Returns the number of vertices removed.
     ///
-    /// For files whose seams do not quite meet. A tolerance near the length of edges eats them: stay well below. Coordinates must be finite.
-    /// Cost: about V log V, at any tolerance.
+    /// Use it for files whose seams do not match exactly. A tolerance near the length of edges collapses them; stay
+    /// well below. Coordinates must be finite. Cost: about V log V, at any tolerance.
     ///
     /// ```
     /// # use stereology_shape::TriangleMesh;
@@ -125,7 +125,7 @@ impl TriangleMesh {
         self.keep_vertices(&first)
     }
 
-    /// Drops vertices that no triangle uses; returns how many.
+    /// Drops vertices that no triangle uses; returns their number.
     pub(crate) fn drop_unused_vertices(&mut self) -> usize {
         let mut target = vec![u32::MAX; self.vertices.len()];
         for &i in self.triangles.iter().flatten() {
@@ -146,7 +146,7 @@ impl TriangleMesh {
             }
         }
         for corner in self.triangles.iter_mut().flatten() {
-            // Indices out of range stay so: the checks that follow name them.
+            // Indices out of range stay out of range: the checks that follow report them.
             if let Some(&to) = target.get(*corner as usize) {
                 *corner = renumbered[to as usize];
             } else {
@@ -163,8 +163,8 @@ impl TriangleMesh {
     }
 }
 
-/// Sets coordinates to zero that are less than 1e-20 of the largest, and tells how many: they are far below its rounding, and products of three
-/// of them would leave the range in which predicates are exact.
+/// Sets coordinates less than 1e-20 of the largest to zero and returns their number. They are far below its rounding,
+/// and products of three of them would leave the range in which predicates are exact.
 pub(crate) fn flush_tiny(points: &mut [Point3<f64>]) -> usize {
     let largest = points
         .iter()

@@ -1,13 +1,14 @@
-//! Inside or outside a closed mesh, decided exactly: signed crossings of a ray with robust predicates.
+//! Exact point-in-mesh test: signed crossings of a ray, by robust predicates.
 
 use nalgebra::Point3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
-/// Signed crossing of triangle `[a, b, c]` with the ray from `p` towards +x: 1 where the ray leaves the solid, -1 where it enters,
-/// else 0. Summed over a closed mesh: how often the mesh winds about `p`; 0 for a point on the surface or outside.
+/// Signed crossing of triangle `[a, b, c]` with the ray from `p` towards +x: 1 where the ray leaves the solid, -1 where
+/// it enters, else 0. The sum over a closed mesh is its winding number about `p`; 0 for a point on the surface or
+/// outside.
 ///
-/// The projections of neighbouring triangles to the (y, z) plane share no point and leave no gap (edges are half-open, signs exact),
-/// so a ray through an edge or a vertex is counted right.
+/// The projections of neighbouring triangles to the (y, z) plane share no point and leave no gap (edges are half-open,
+/// signs exact), so a ray through an edge or a vertex is counted correctly.
 pub(crate) fn ray_crossing([a, b, c]: &[Point3<f64>; 3], p: &Point3<f64>) -> i32 {
     let turns = edge_crossing(a, b, p) + edge_crossing(b, c, p) + edge_crossing(c, a, p);
     if turns == 0 {

@@ -1,18 +1,19 @@
-//! Where parallel lines run inside a body: exactly for convex ones of few faces, within two balls for others.
+//! Chords of parallel lines in a body: exact for convex bodies with few faces, bounded by two balls for others.
 
 use nalgebra::{Vector3, Vector4};
 
-/// Heights above a surface, in sizes of the body, below which rounding may decide whether a point is inside.
+/// Heights above a surface, in units of the body's size, below which rounding may decide whether a point is inside.
 const MARGIN: f64 = 1e-9;
 
-/// Parameters between which a line is inside: surely, and at most.
+/// Parameters between which a line is certainly inside and possibly inside.
 ///
-/// Points at parameters in `sure` are inside, points not in `possible` outside. Between them ask [`contains`](crate::UnitBody::contains). Empty where the first is not below the second.
+/// Points at parameters in `sure` are inside, points not in `possible` are outside. Test the points between with
+/// [`contains`](crate::UnitBody::contains). An interval is empty if its first end is not below its second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chord {
-    /// Within these the line is inside.
+    /// The line is inside between these.
     pub sure: [f64; 2],
-    /// Beyond these the line is outside.
+    /// The line is outside beyond these.
     pub possible: [f64; 2],
 }
 
@@ -25,12 +26,13 @@ impl Chord {
 
 const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
-/// The chords of the lines of a plane: `origin + s across + t along`, a line for every s.
+/// The chords of the lines of a plane: `origin + s across + t along`, one line for every s.
 ///
 /// # Formula
 ///
-/// The point of a line nearest to the centre of a ball is at t = m₀ + m₁ s, at the squared distance d² = n (s − s₀)² + d₀²; the line is in the ball within √((r² − d²) / along²) of it. A face n·p = w is met where t = −(n·p₀ − w) / (n·along), linear
-/// in s too.
+/// The point of a line nearest to the centre of a ball is at t = m₀ + m₁ s, at the squared distance d² = n (s − s₀)² +
+/// d₀²; the line is in the ball within √((r² − d²) / along²) of it. A face n·p = w is met where t = −(n·p₀ − w) /
+/// (n·along), linear in s too.
 #[derive(Clone, Debug)]
 pub struct Chords {
     /// The plane: m₀ and m₁, s₀, d₀², n, and 1 / along².
@@ -39,20 +41,21 @@ pub struct Chords {
     nearest: f64,
     spread: f64,
     per_square: f64,
-    /// Squared radius of a ball that holds the body.
+    /// Squared radius of a ball that contains the body.
     outer: f64,
-    /// What is surely inside, before the faces: the ball of this squared radius, or all of the other one.
+    /// The region that is certainly inside before faces are considered: the ball of this squared radius, or all of the
+    /// outer ball.
     inner: Option<f64>,
-    /// Faces that end the body towards higher t and towards lower t.
+    /// Faces that bound the body towards higher t and towards lower t.
     ends: Vec<Face>,
     starts: Vec<Face>,
-    /// How far rounding may move them.
+    /// Margin for their rounding.
     margin: f64,
-    /// Faces that the lines meet at a small angle, and those along which they run.
+    /// Faces that the lines meet at a small angle, and faces parallel to the lines.
     shallow: Vec<Shallow>,
 }
 
-/// Where the lines meet the plane of a face, as seen from their points nearest to the centre: t = at + turn s.
+/// Where the lines meet the plane of a face, relative to their points nearest to the centre: t = at + turn s.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     at: f64,
@@ -67,12 +70,13 @@ struct Shallow {
     slope: f64,
 }
 
-/// Sines of the angles at which faces are met: below the first as if level, below the second with a margin of their own.
+/// Sines of the angles between lines and faces: below the first a face counts as parallel, below the second it gets its
+/// own margin.
 const LEVEL: f64 = 1e-9;
 const SHALLOW: f64 = 1e-3;
 
 impl Chords {
-    /// Of a body that lies in the ball of radius `outer` about the origin and holds the one of radius `inner`.
+    /// Chords of a body between the balls of radius `inner` and `outer` about the origin.
     pub(crate) fn of_balls(
         [inner, outer]: [f64; 2],
         origin: &Vector3<f64>,
@@ -80,12 +84,12 @@ impl Chords {
         along: &Vector3<f64>,
     ) -> Self {
         let mut chords = Self::of_plane(&Plane::new(origin, across, along), outer);
-        // Of no ball nothing is sure: a negative square.
+        // Without an inner ball nothing is certain: a negative square.
         chords.inner = Some((inner - MARGIN).powi(2).copysign(inner - MARGIN));
         chords
     }
 
-    /// Of what is below the planes of the faces, all within the ball of radius `outer`.
+    /// Chords of the region below the planes of the faces, all within the ball of radius `outer`.
     pub(crate) fn of_faces(
         outer: f64,
         faces: &[Vector4<f64>],
@@ -96,7 +100,7 @@ impl Chords {
         let plane = Plane::new(origin, across, along);
         let mut chords = Self::of_plane(&plane, outer);
         let normal = across.cross(along).normalize();
-        // The plane cuts a disc out of the ball, about this point of its normal.
+        // The plane cuts a disc from the ball, centred at this point along its normal.
         let depth = normal.dot(&plane.nearest());
         let disc = (chords.outer - depth * depth).max(0.0);
         let per_length = along.norm().recip();
@@ -105,7 +109,7 @@ impl Chords {
         for face in faces {
             let upright = face.xyz().dot(&normal);
             let height = upright * depth - face.w;
-            // The disc reaches as far above and below its middle as the root of this.
+            // The disc extends above and below its centre by the square root of this.
             let reach = disc * (1.0 - upright * upright);
             let clear = height.abs() - MARGIN;
             if clear > 0.0 && clear * clear > reach {
@@ -158,7 +162,7 @@ impl Chords {
     pub fn at(&self, s: f64) -> Chord {
         let off = s - self.nearest_at;
         let nearest = self.nearest + self.spread * off * off;
-        // Not a number if the line misses the ball.
+        // NaN if the line misses the ball.
         let half = |square: f64| ((square - nearest) * self.per_square).sqrt();
         let outer = half(self.outer);
         if outer.is_nan() {
@@ -199,11 +203,11 @@ impl Chords {
 }
 
 impl Shallow {
-    /// Takes off a chord what the face cuts off; t is at most `outer`.
+    /// Shortens a chord by the part that the face cuts off; t is at most `outer`.
     fn cut(&self, s: f64, outer: f64, per_square: f64, chord: &mut Chord) {
         let height = self.height + self.climb * s;
         if self.slope * self.slope * per_square < LEVEL * LEVEL {
-            // Along the chord it rises or falls by less than that.
+            // Along the chord the height changes by less than this.
             let margin = MARGIN + self.slope.abs() * outer;
             if height > margin {
                 *chord = Chord::NONE;
@@ -223,7 +227,7 @@ impl Shallow {
     }
 }
 
-/// As `min` and `max`, in one instruction: numbers only.
+/// `min` and `max` in one instruction, for numbers other than NaN.
 fn lower(a: f64, b: f64) -> f64 {
     if b < a { b } else { a }
 }
@@ -232,7 +236,7 @@ fn higher(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }
 }
 
-/// Lines by their points nearest to the centre: `origin + s across`.
+/// Lines, given by their points nearest to the centre: `origin + s across`.
 struct Plane {
     origin: Vector3<f64>,
     across: Vector3<f64>,
@@ -261,7 +265,8 @@ impl Plane {
         }
     }
 
-    /// The point of the plane nearest to the centre. Of far planes it holds what differences of large squares would lose.
+    /// The point of the plane nearest to the centre. For distant planes it keeps digits that differences of large
+    /// squares would lose.
     fn nearest(&self) -> Vector3<f64> {
         self.origin + self.nearest_at * self.across
     }
@@ -278,7 +283,7 @@ mod tests {
         prop::array::uniform3(-reach..reach).prop_map(Vector3::from)
     }
 
-    /// The last of them by its two balls alone.
+    /// The last of them by its two balls only.
     static BODIES: LazyLock<Vec<UnitBody>> = LazyLock::new(|| {
         let rocks = (0..8).map(|seed| Ok(Body::rock(seed)));
         let others = [
@@ -291,7 +296,8 @@ mod tests {
     });
 
     proptest! {
-        /// Along the lines of any plane, and of planes along the axes, chords and the point test agree; little is left to the point test.
+        /// Along the lines of any plane, and of planes along the axes, chords and the point test agree; few points are
+        /// left to the point test.
         #[test]
         fn chords_and_points_agree(
             from in vector(1.0),
@@ -320,7 +326,7 @@ mod tests {
                     let [sure, possible] = [chord.sure, chord.possible].map(length);
                     prop_assert!(sure <= possible);
                     prop_assert!(possible <= 2.0 * body.bounding_radius() + 1e-8);
-                    // Of a line that touches the surface a stretch of √margin is unsure.
+                    // On a line that touches the surface, a length of √margin is uncertain.
                     prop_assert!(index + 1 == BODIES.len() || possible - sure < 1e-3);
                 }
             }

@@ -7,7 +7,8 @@ use crate::mesh::measures::double_area;
 use crate::mesh::topology::{Neighbours, neighbours};
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// The faces of a convex mesh as half-spaces n·x ≤ d, stored (n, d), largest face first; triangles in one plane are one face.
+/// The faces of a convex mesh as half-spaces n·x ≤ d, stored (n, d), largest face first; triangles in one plane form
+/// one face.
 pub(crate) fn half_spaces(hull: &TriangleMesh) -> Vec<Vector4<f64>> {
     let across = neighbours(hull).unwrap_or_default();
     let reach = hull.vertices.iter().map(|v| v.coords.norm()).fold(0.0, f64::max);
@@ -23,7 +24,7 @@ pub(crate) fn half_spaces(hull: &TriangleMesh) -> Vec<Vector4<f64>> {
     });
     let mut used = vec![false; areas.len()];
     let mut faces = Vec::new();
-    // The normal of a sliver is rounding; left out, the body grows by less than its width.
+    // The normal of a sliver is dominated by rounding; leaving it out enlarges the body by less than its width.
     let sliver = 1e-10 * reach * reach;
     for start in order {
         if !used[start] && areas[start].norm() > sliver {
@@ -34,7 +35,8 @@ pub(crate) fn half_spaces(hull: &TriangleMesh) -> Vec<Vector4<f64>> {
     faces.into_iter().map(|(_, plane)| plane).collect()
 }
 
-/// Gathers the triangles about `start` whose corners lie within `tolerance` of its plane; returns twice their area and their half-space.
+/// Gathers the triangles about `start` whose corners lie within `tolerance` of its plane; returns twice their area and
+/// their half-space.
 fn face_from(
     start: usize,
     hull: &TriangleMesh,
@@ -77,11 +79,11 @@ pub(crate) struct SupportMap {
     /// `beside[starts[v]..starts[v + 1]]` are the vertices that share an edge with v; empty for few vertices.
     starts: Vec<u32>,
     beside: Vec<u32>,
-    /// A vertex near the answer for each cell of a cube of directions.
+    /// A starting vertex near the result for each cell of a cube of directions.
     guesses: Vec<u32>,
 }
 
-/// Up to here looking at all vertices is faster than walking.
+/// Up to this number of vertices, a scan of all of them is faster than walking.
 const FEW: usize = 48;
 /// Cells along an edge of the cube of directions.
 const CELLS: usize = 8;
@@ -120,7 +122,7 @@ impl SupportMap {
         map
     }
 
-    /// The farthest vertex; ties: any one of them.
+    /// The farthest vertex; any of them in a tie.
     pub(crate) fn support(&self, direction: &Vector3<f64>) -> Point3<f64> {
         if !self.guesses.is_empty() {
             return self.vertices[self.climb(self.guesses[direction_cell(direction)], direction) as usize];
@@ -135,7 +137,7 @@ impl SupportMap {
         self.vertices[best.1]
     }
 
-    /// Walks uphill along edges; on a convex body the first summit is the highest.
+    /// Walks along edges to higher vertices; on a convex body the first maximum is the global one.
     fn climb(&self, from: u32, direction: &Vector3<f64>) -> u32 {
         let height = |v: u32| self.vertices[v as usize].coords.dot(direction);
         let mut best = (height(from), from);
@@ -154,7 +156,7 @@ impl SupportMap {
     }
 }
 
-/// Cell of a cube around the origin that a direction points at.
+/// Cell of a cube around the origin hit by a direction.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

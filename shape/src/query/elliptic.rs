@@ -4,10 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 /// Carlson's R_G(x, y, z): the mean over all directions u of √(x u₁² + y u₂² + z u₃²). Arguments positive.
 ///
-/// With it the mean width of an ellipsoid is 2 R_G(a², b², c²) and its surface 4π R_G(a²b², a²c², b²c²).
-/// Carlson 1995, *Numerical computation of real or complex elliptic integrals*; duplication until the series' error is below 1e-16.
+/// With it the mean width of an ellipsoid is 2 R_G(a², b², c²) and its surface 4π R_G(a²b², a²c², b²c²). Carlson 1995,
+/// *Numerical computation of real or complex elliptic integrals*; duplication until the series' error is below 1e-16.
 pub(crate) fn carlson_rg(x: f64, y: f64, z: f64) -> f64 {
-    // With z between x and y all three terms are positive: nothing cancels.
+    // With z between x and y all three terms are positive, so no digits cancel.
     let mut sorted = [x, y, z];
     sorted.sort_unstable_by(f64::total_cmp);
     let [y, z, x] = sorted;
@@ -62,9 +62,10 @@ pub(crate) fn section_area(axes: &Vector3<f64>, normal: &Vector3<f64>, offset: f
 
 /// Signed distance of `p` to the surface, negative inside.
 ///
-/// The nearest point is xᵢ = aᵢ² pᵢ / (aᵢ² + t), with t the largest root of Σ (aᵢ pᵢ / (aᵢ² + t))² = 1 (Eberly, *Distance from a point
-/// to an ellipsoid*). That sum falls and is convex right of its last pole, so Newton steps from the left of the root cannot overshoot;
-/// bisection guards them. The unknown is s = t + a₁², the distance from that pole (a₁ the smallest axis), so no digits are lost near it.
+/// The nearest point is xᵢ = aᵢ² pᵢ / (aᵢ² + t), with t the largest root of Σ (aᵢ pᵢ / (aᵢ² + t))² = 1 (Eberly,
+/// *Distance from a point to an ellipsoid*). That sum decreases and is convex to the right of its last pole, so Newton
+/// steps from the left of the root cannot overshoot; bisection safeguards them. The unknown is s = t + a₁², the
+/// distance from that pole (a₁ the smallest axis), so no digits are lost near it.
 pub(crate) fn signed_distance(axes: &Vector3<f64>, p: &Point3<f64>) -> f64 {
     // In units of the smallest axis, all coordinates positive.
     let smallest = axes.min();
@@ -78,7 +79,7 @@ pub(crate) fn signed_distance(axes: &Vector3<f64>, p: &Point3<f64>) -> f64 {
     };
     let term = |i: usize, s: f64| if y[i] == 0.0 { 0.0 } else { e[i] * y[i] / (gap[i] + s) };
     let value = |s: f64| (0..3).map(|i| term(i, s).powi(2)).sum::<f64>() - 1.0;
-    // At `low` the terms of the smallest axis alone make the sum 1; at `high` the sum is at most 1.
+    // At `low` the terms of the smallest axis alone add up to 1; at `high` the sum is at most 1.
     let mut low = (0..3)
         .filter(|&i| gap[i] == 0.0)
         .map(|i| y[i] * y[i])
@@ -122,7 +123,8 @@ pub(crate) fn signed_distance(axes: &Vector3<f64>, p: &Point3<f64>) -> f64 {
     sign * to_surface.norm()
 }
 
-/// Distance for s = 0: the coordinates along longer axes follow from s, those along the smallest make up the rest.
+/// Distance for s = 0: the coordinates along longer axes follow from s, and those along the smallest axis contribute
+/// the rest.
 fn distance_at_pole(e: &Vector3<f64>, y: &Vector3<f64>, gap: &Vector3<f64>) -> f64 {
     let mut square = 0.0;
     let mut left = 1.0;

@@ -1,4 +1,4 @@
-//! Fast exact test of inside and outside for any closed mesh: its triangles sorted into columns along x.
+//! Fast exact point-in-mesh test: triangles sorted into columns along x.
 
 use nalgebra::Point3;
 
@@ -7,7 +7,8 @@ use crate::mesh::index::index;
 use crate::mesh::triangle_mesh::TriangleMesh;
 use crate::mesh::winding::ray_crossing;
 
-/// Inside or outside a closed mesh in its own place and size, exactly and in about a microsecond: what voxels are made with. Preparing costs about a microsecond a triangle.
+/// Exact point-in-mesh test for a closed mesh in its own position and size, in about a microsecond per point.
+/// Preparation costs about a microsecond per triangle.
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -32,14 +33,15 @@ impl InsideTest {
         }
     }
 
-    /// Whether a point is inside; points of the surface itself are outside.
+    /// Whether a point is inside; points on the surface are outside.
     #[must_use]
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         self.columns.contains(p)
     }
 }
 
-/// Triangles by the cells of a grid in (y, z) that their projections touch: a ray along x meets those of one cell only.
+/// Triangles by the cells of a grid in (y, z) that their projections touch: a ray along x meets the triangles of one
+/// cell only.
 #[derive(Clone, Debug)]
 pub(crate) struct Columns {
     low: Point3<f64>,
@@ -69,7 +71,7 @@ impl Columns {
             let touched: Vec<[[usize; 2]; 2]> = (0..mesh.triangles.len())
                 .map(|t| columns.touched(&mesh.corners(t)))
                 .collect();
-            // Long triangles touch many cells: keep memory linear in the number of triangles.
+            // Long triangles touch many cells; this keeps memory linear in the number of triangles.
             let entries: usize = touched
                 .iter()
                 .map(|[from, to]| (to[0] - from[0] + 1) * (to[1] - from[1] + 1))
@@ -118,7 +120,7 @@ impl Columns {
         self.density = [1, 2].map(|k| if size[k] > 0.0 { side / size[k] } else { 0.0 });
     }
 
-    /// First and last cell under a triangle, both ways.
+    /// First and last cell under a triangle along both axes.
     fn touched(&self, [a, b, c]: &[Point3<f64>; 3]) -> [[usize; 2]; 2] {
         [self.cell(&a.inf(b).inf(c)), self.cell(&a.sup(b).sup(c))]
     }

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::mesh::index::index;
 use crate::mesh::triangle_mesh::TriangleMesh;
 
-/// Boxes in boxes over the triangles, split at the median of the longest side.
+/// A tree of bounding boxes of the triangles, split at the median of the longest side.
 #[derive(Clone, Debug)]
 pub(crate) struct BoxTree {
     nodes: Vec<Node>,
@@ -17,7 +17,7 @@ pub(crate) struct BoxTree {
 struct Node {
     low: Point3<f64>,
     high: Point3<f64>,
-    /// Triangles of the leaf, or the two halves: the first follows its parent, the second is at `start`.
+    /// First triangle of a leaf, or the second child of an inner node; the first child follows its parent.
     start: u32,
     /// Number of triangles of a leaf; 0 for an inner node.
     count: u32,

@@ -1,4 +1,4 @@
-//! The largest single profile that any plane cuts from a mesh: the area that gives a body its size.
+//! The largest single profile of any plane section of a mesh; its area defines the size of a body.
 
 use std::f64::consts::PI;
 
@@ -12,14 +12,15 @@ use crate::section::slicer::Slicer;
 
 /// Area of the largest single profile, by maximisation over directions and depths.
 ///
-/// Never a maximum over random sections: that is 2 % low for a cube after 10,000 of them. Here the total area at **all** depths of
-/// directions spread over the half-sphere (and of the hull's largest faces) bounds what a single profile can have there; the directions
-/// with the highest bounds are cut, the best distinct cuts are climbed by shrinking polls in direction and depth together, and the best is
-/// tried against planes through pairs and triples of vertices near it, where polyhedra have their maxima; bodies of few vertices also
-/// against planes through all pairs.
-/// The result is the area of a section that exists: never too large. Fine meshes of round bodies have many summits of nearly one height,
-/// of which the highest may be missed by some 1e-6. Of a thousand hulls of 6, 8 and 12 random points, 6, 0 and 2 had a larger one in
-/// another orientation, by 8e-5 at most. Same bits at any number of threads.
+/// A maximum over random sections would be too low: by 2 % for a cube after 10,000 sections. Here the total area at
+/// **all** depths of directions spread over the half-sphere (and of the hull's largest faces) bounds the area of a
+/// single profile there. The directions with the highest bounds are cut; the best distinct cuts are improved by a
+/// pattern search with decreasing steps in direction and depth; and the best is compared with planes through pairs and
+/// triples of vertices near it, where polyhedra have their maxima. Bodies with few vertices are also tested with planes
+/// through all pairs. The result is the area of an existing section, so it is never too large. Fine meshes of round
+/// bodies have many local maxima of nearly equal height; the highest may be missed by some 1e-6. Of a thousand hulls of
+/// 6, 8 and 12 random points, 6, 0 and 2 gave a larger value in another orientation, by 8e-5 at most. The result has
+/// the same bits at any number of threads.
 pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
     let budget = Budget::of(mesh);
     let starts = scan(mesh, &budget);
@@ -27,7 +28,7 @@ pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
     let Some((first, others)) = starts.split_first() else {
         return 0.0;
     };
-    // The first summit tells the others what to beat.
+    // The first maximum is the bound that the others must exceed.
     let top = Search::new(mesh, &budget).summit_from(*first, 0.0);
     let mut tops: Vec<Cut> = others
         .par_iter()
@@ -54,7 +55,7 @@ pub(crate) fn largest_section_area(mesh: &ClosedMesh) -> f64 {
         .fold(tops[0].area, f64::max)
 }
 
-/// A plane and the largest profile it cuts.
+/// A plane and its largest profile.
 #[derive(Clone, Copy)]
 struct Cut {
     normal: UnitVector3<f64>,
@@ -68,14 +69,14 @@ impl Cut {
     }
 }
 
-/// How much to look: small meshes are cheap and have many near ties, large ones are smooth.
+/// Extent of the search: small meshes are cheap and have many near ties, large ones are smooth.
 struct Budget {
     directions: u32,
     depths: usize,
     climbs: usize,
-    /// Summits that are tried against planes through vertices.
+    /// Number of maxima compared with planes through vertices.
     snaps: usize,
-    /// First poll of a climb, in radians and in units of the body's reach; and the last.
+    /// First and last step of the pattern search, in radians and in units of the body's reach.
     step: f64,
     finest: f64,
 }
@@ -99,13 +100,14 @@ impl Budget {
     }
 }
 
-/// Bodies of so few vertices are tried with planes through all pairs of them.
+/// Bodies with at most this many vertices are tested with planes through all pairs of vertices.
 const MOST_PAIRED: usize = 12;
 
-/// Rounds of a climb: most take some 30; along a ridge that bends the gains may grow small and never end.
+/// Iterations of the pattern search. Most searches take some 30; along a curved ridge the gains may become small
+/// without end.
 const MOST_ROUNDS: usize = 250;
 
-/// Where a climb looks, in steps: what second differences need.
+/// Positions of the pattern, in steps: those that second differences need.
 const POLLS: [[f64; 3]; 9] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
@@ -118,7 +120,8 @@ const POLLS: [[f64; 3]; 9] = [
     [1.0, 0.0, 1.0],
 ];
 
-/// Summit of the parabola through the centre and the polls, in steps, and how much higher it is; `None` if it has none.
+/// Maximum of the paraboloid through the centre and the pattern, in steps, and its height above the centre; `None`
+/// without a maximum.
 fn summit(centre: f64, polls: &[f64; 9]) -> Option<(Vector3<f64>, f64)> {
     let p = |k: usize| polls[k] - centre;
     let gradient = Vector3::new(p(0) - p(1), p(2) - p(3), p(4) - p(5)) * 0.5;
@@ -129,7 +132,7 @@ fn summit(centre: f64, polls: &[f64; 9]) -> Option<(Vector3<f64>, f64)> {
     Some((place, 0.5 * gradient.dot(&place)))
 }
 
-/// Good cuts of directions spread over the half-sphere, best first.
+/// Good sections of directions spread over the half-sphere, best first.
 fn scan(mesh: &ClosedMesh, budget: &Budget) -> Vec<Cut> {
     let mut directions = half_sphere(budget.directions);
     directions.extend(largest_hull_normals(mesh, 32));
@@ -146,7 +149,7 @@ fn scan(mesh: &ClosedMesh, budget: &Budget) -> Vec<Cut> {
     let mut cuts: Vec<Cut> = Vec::new();
     let mut best = 0.0_f64;
     for batch in bounds.chunks(8) {
-        // Enough directions are known that beat what the rest can at most have.
+        // Enough directions are known that exceed the bounds of the rest.
         if batch[0].area < 0.9 * best && cuts.len() >= budget.climbs {
             break;
         }
@@ -164,7 +167,7 @@ fn scan(mesh: &ClosedMesh, budget: &Budget) -> Vec<Cut> {
     cuts
 }
 
-/// The depth of the largest total area across a direction: exact, a summit of quadratics.
+/// The depth of the largest total area perpendicular to a direction: exact, the maximum of a piecewise quadratic.
 fn largest_total(areas: &mut SectionAreas, normal: UnitVector3<f64>) -> Cut {
     let mut best = (0.0, 0.0);
     areas.sweep(&normal, |low, high, [a, b, c]| {
@@ -191,7 +194,7 @@ struct Search<'a> {
     slicer: Slicer<'a>,
     budget: &'a Budget,
     reach: f64,
-    /// While a climb looks around closely: the triangles its planes can meet.
+    /// During fine steps of the pattern search: the triangles that its planes can meet.
     nearby: Option<Vec<usize>>,
 }
 
@@ -207,7 +210,7 @@ impl<'a> Search<'a> {
     }
 
     fn summit_from(&mut self, start: Cut, to_beat: f64) -> Cut {
-        // What the scan tells of a convex body is a total that rounding may lift.
+        // For a convex body the scan gives a total area that rounding may increase.
         let start = self.cut(start.normal, start.offset);
         self.climb(start, self.budget.step, to_beat)
     }
@@ -223,7 +226,7 @@ impl<'a> Search<'a> {
         top
     }
 
-    /// The largest profile across a direction, of depths spread evenly whose total area is above `least`.
+    /// The largest profile perpendicular to a direction, among evenly spaced depths with a total area above `least`.
     fn best_depth(&mut self, bound: &Cut, areas: &mut SectionAreas, least: f64) -> Cut {
         let normal = bound.normal;
         self.slicer.turn_to(&normal);
@@ -233,7 +236,7 @@ impl<'a> Search<'a> {
         let offsets: Vec<f64> = (0..steps)
             .map(|i| low + (high - low) * (i as f64 + 0.5) / steps as f64)
             .collect();
-        // The bound's own depth, too: where the section is one profile nothing beats it.
+        // Also the depth of the bound: if that section is one profile, it is the largest.
         let mut wanted = vec![bound.offset];
         let (reach, mut next) = (areas.reach(), 0);
         areas.sweep(&normal, |from, to, [a, b, c]| {
@@ -259,7 +262,7 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Largest profile at each of the rising offsets, each cut looking only at the triangles that span it.
+    /// Largest profile at each of the ascending offsets; each section visits only the triangles that span it.
     fn areas_at(&mut self, offsets: &[f64]) -> Vec<(f64, f64)> {
         let mut spanning: Vec<Vec<usize>> = vec![Vec::new(); offsets.len()];
         for (t, corners) in self.mesh.triangles().iter().enumerate() {
@@ -287,8 +290,8 @@ impl<'a> Search<'a> {
         Cut { normal, offset, area }
     }
 
-    /// Polls planes around the best one so far, turned and shifted by `step`, and the summit of the parabola through the polls; halves
-    /// the step where none is better. Gives up a summit that will stay below `to_beat`.
+    /// Tests planes around the best one so far, rotated and shifted by `step`, and the maximum of the paraboloid
+    /// through the results; halves the step if none is better. Stops at a maximum that will stay below `to_beat`.
     fn climb(&mut self, start: Cut, step: f64, to_beat: f64) -> Cut {
         let mut best = start;
         let mut step = step;
@@ -299,7 +302,7 @@ impl<'a> Search<'a> {
             rounds += 1;
             let centre = best;
             self.look_about(&centre, step);
-            // Fresh axes each round: on the ridges of polyhedra fixed ones get stuck.
+            // New axes in each iteration: on the ridges of polyhedra fixed axes get stuck.
             turn += 2.4;
             let polls = POLLS.map(|[x, y, z]| self.near(&centre, turn, [x * step, y * step, z * step]));
             for tried in &polls {
@@ -317,7 +320,8 @@ impl<'a> Search<'a> {
                 continue;
             }
             failures += 1;
-            // Where profiles merge and part the area jumps: wide steps get several tries, fine ones end on a smooth summit.
+            // The area jumps where profiles merge and separate: wide steps get several attempts, fine ones end on a
+            // smooth maximum.
             if step < 0.01 && gain < 1e-13 * best.area {
                 break;
             }
@@ -330,7 +334,7 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Finds the triangles that planes up to four steps from this one can meet, where those are few.
+    /// Finds the triangles that planes up to four steps from this one can meet, if they are few.
     fn look_about(&mut self, centre: &Cut, step: f64) {
         self.nearby = None;
         let margin = 8.0 * step * self.reach;
@@ -352,20 +356,21 @@ impl<'a> Search<'a> {
         );
     }
 
-    /// The cut of a plane near `from`: turned by x and y about two axes in it, which `turn` turns, and shifted by z times the reach.
+    /// The section by a plane near `from`: rotated by x and y about two axes in it, which `turn` rotates, and shifted
+    /// by z times the reach.
     fn near(&mut self, from: &Cut, turn: f64, [x, y, z]: [f64; 3]) -> Cut {
         let [u, v] = crate::section::slicer::plane_basis(&from.normal);
         let (sin, cos) = turn.sin_cos();
         let (u, v) = (u * cos + v * sin, v * cos - u * sin);
         let pivot = self.mesh.centroid().coords;
         let normal = UnitVector3::new_normalize(from.normal.into_inner() + u * x + v * y);
-        // The distance from the centroid is kept, so turning and shifting are apart.
+        // The distance from the centroid is kept, so rotation and shift are independent.
         let offset = from.offset + pivot.dot(&(normal.into_inner() - from.normal.into_inner())) + z * self.reach;
         self.cut(normal, offset)
     }
 
-    /// The best plane near the given one through two or three of the vertices it passes closely: an edge in the plane makes a ridge
-    /// of the area that polls cannot follow.
+    /// The best plane near the given one through two or three of the vertices close to it: an edge in the plane makes a
+    /// ridge of the area that the pattern search cannot follow.
     fn snap(&mut self, near: &Cut) -> Cut {
         let mut close: Vec<(f64, usize)> = Vec::new();
         for (i, v) in self.mesh.vertices().iter().enumerate() {
@@ -391,8 +396,8 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// The best of `best` and the planes through two vertices: a climb ends on the ridges that these make. Between the angles at which such
-    /// a plane meets a third vertex the area is smooth.
+    /// The best of `best` and the planes through two vertices: the pattern search ends on the ridges that they make.
+    /// Between the angles at which such a plane meets a third vertex the area is smooth.
     fn best_through_pairs(&mut self, best: &Cut) -> Cut {
         let vertices: Vec<Vector3<f64>> = self.mesh.vertices().iter().map(|v| v.coords).collect();
         let mut best = *best;
@@ -403,7 +408,7 @@ impl<'a> Search<'a> {
                 };
                 let [u, v] = crate::section::slicer::plane_basis(&line);
                 let normal = |angle: f64| UnitVector3::new_normalize(u * angle.cos() + v * angle.sin());
-                // The normal is across the third vertex: a quarter turn on.
+                // The normal is perpendicular to the direction of the third vertex: a quarter turn further.
                 let third = vertices
                     .iter()
                     .map(|r| r - p)
@@ -431,7 +436,8 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// The plane through three points, a hair to the better side (a face may lie in it); of no area if they lie on a line.
+    /// The plane through three points, shifted slightly to the better side (a face may lie in it); of area zero if they
+    /// lie on a line.
     fn through(&mut self, points: &[Point3<f64>; 3]) -> Cut {
         let Some(normal) = UnitVector3::try_new(double_area(points), 1e-12 * self.reach * self.reach) else {
             return Cut {
@@ -445,7 +451,7 @@ impl<'a> Search<'a> {
         self.cut(normal, offset - side).larger(&self.cut(normal, offset + side))
     }
 
-    /// The best of the planes through p and q that are turned at most 0.03 from `near`, by golden sections.
+    /// The best of the planes through p and q at most 0.03 rad from `near`, by golden-section search.
     fn best_about_line(&mut self, near: &Cut, p: &Point3<f64>, q: &Point3<f64>) -> Cut {
         let line = (q - p).normalize();
         let start = near.normal.into_inner() - line * line.dot(&near.normal);
@@ -457,7 +463,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The largest of the cuts between `low` and `high` if they have one summit, to `width`, by golden sections.
+/// The largest of the sections between `low` and `high` if they have a single maximum, to `width`, by golden-section
+/// search.
 fn highest(mut low: f64, mut high: f64, width: f64, mut at: impl FnMut(f64) -> Cut) -> Cut {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let mut inner = [high - golden * (high - low), low + golden * (high - low)];
@@ -483,7 +490,7 @@ fn largest(profiles: Vec<crate::section::slicer::FlatProfile>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Starts best first, none within 0.12 of another (as planes: opposite normals are the same).
+/// Starting planes, best first, none within 0.12 of another (opposite normals are the same plane).
 fn distinct(sorted: &[Cut], count: usize) -> Vec<Cut> {
     let mut chosen: Vec<Cut> = Vec::new();
     for cut in sorted {
@@ -497,7 +504,8 @@ fn distinct(sorted: &[Cut], count: usize) -> Vec<Cut> {
     chosen
 }
 
-/// Fibonacci points of the half-sphere, turned off the axes so that no symmetric body is cut along its edges only.
+/// Fibonacci points on the half-sphere, rotated off the axes so that symmetric bodies are not cut along their edges
+/// only.
 fn half_sphere(count: u32) -> Vec<UnitVector3<f64>> {
     let off_axis = Rotation3::from_euler_angles(0.3, 0.7, 1.1);
     let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
@@ -520,7 +528,7 @@ fn largest_hull_normals(mesh: &ClosedMesh, count: usize) -> Vec<UnitVector3<f64>
     areas.truncate(count);
     areas
         .into_iter()
-        // A hair aside: no edge of the face is level.
+        // Slightly rotated, so that no edge of the face is level.
         .filter_map(|area| UnitVector3::try_new(area.normalize() + Vector3::new(3e-6, 5e-6, 7e-6), 1e-3))
         .collect()
 }

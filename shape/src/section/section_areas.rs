@@ -1,14 +1,15 @@
-//! The area of every section across a direction at once: a quadratic spline over depth whose knots are the vertices.
+//! The area of all sections perpendicular to a direction: a quadratic spline over depth whose knots are the vertices.
 //!
-//! The section closes the surface below it, so its area is minus the flux of that surface's area vectors a_t through the direction u:
+//! The section closes the surface below it, so its area is minus the flux of that surface's area vectors a_t along the
+//! direction u:
 //!
 //! ```text
 //! A(h) = − Σ over triangles (a_t · u) Σ over corners (h − h_i)₊² / ((h_i − h_j) (h_i − h_k))
 //! ```
 //!
-//! where the inner sum, the divided difference of a truncated square, is the part of the triangle below h. Near a vertex the section
-//! changes by a polygon as large as the distance from it: area and slope are continuous, only the second derivative jumps. Nothing is cut,
-//! no contour is walked.
+//! where the inner sum, the divided difference of a truncated square, is the part of the triangle below h. Near a
+//! vertex the section changes by a polygon as large as the distance from it: area and slope are continuous, only the
+//! second derivative jumps. No triangle is cut and no contour is followed.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,8 +18,8 @@ use crate::mesh::measures::double_area;
 
 /// Sweeps planes across a mesh: total area of the section as a function of depth, for one direction after another.
 ///
-/// Works about the mesh's centroid in units of its reach (the distance of its farthest vertex), so that depths are within ±1.
-/// Cost of a direction: T + V log V.
+/// Coordinates are relative to the mesh's centroid in units of its reach (the distance of its farthest vertex), so
+/// depths are within ±1. Cost per direction: T + V log V.
 ///
 /// # Examples
 ///
@@ -49,16 +50,16 @@ pub struct SectionAreas {
     knots: Knots,
 }
 
-/// The knots of the area function across one direction.
+/// The knots of the area function of one direction.
 #[derive(Clone, Debug, Default)]
 pub struct Knots {
     /// Height of each vertex over the centroid, in units of the reach.
     pub heights: Vec<f64>,
     /// Half the jump of the second derivative of the area at each vertex.
     pub jumps: Vec<f64>,
-    /// Vertices from the lowest up, level ones by index: a total order.
+    /// Vertices in ascending height, equal heights by index: a total order.
     pub order: Vec<u32>,
-    /// What is sorted: the upper bits of a height, and below them the vertex.
+    /// The sort keys: the upper bits of a height, and below them the vertex.
     keys: Vec<u64>,
 }
 
@@ -85,7 +86,7 @@ impl SectionAreas {
         }
     }
 
-    /// The mesh's unit of length in units of the sweep's: multiply depths by it, areas by its square.
+    /// Length of the sweep's unit in the mesh's unit: multiply depths by it and areas by its square.
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.reach
@@ -97,11 +98,11 @@ impl SectionAreas {
         self.centre
     }
 
-    /// Visits the pieces of the area function across `direction` (a unit vector), from the lowest depth up: `visit(low, high, [a, b, c])`
-    /// says that the sections at depths `low + t` up to `high` have area a + b t + c t².
+    /// Visits the pieces of the area function along `direction` (a unit vector), in ascending depth: after `visit(low,
+    /// high, [a, b, c])`, sections at depths `low + t` up to `high` have area a + b t + c t².
     ///
-    /// Returns by how much ∫ A dh differs from the volume, as a part of it: 1e-12 or so for nearly every direction, but up to anything
-    /// (NaN too) for one along which an edge is exactly level. Take such a direction a hair aside, or cut by
+    /// Returns the relative difference of ∫ A dh from the volume: about 1e-12 for nearly every direction, but any value
+    /// (NaN too) for a direction perpendicular to an edge. Rotate such a direction slightly, or cut with
     /// [`section_polygons`](crate::section_polygons).
     pub fn sweep(&mut self, direction: &Vector3<f64>, mut visit: impl FnMut(f64, f64, [f64; 3])) -> f64 {
         let mut knots = std::mem::take(&mut self.knots);
@@ -125,8 +126,8 @@ impl SectionAreas {
         (volume / self.volume - 1.0).abs()
     }
 
-    /// Finds where the pieces of the area function across `direction` (a unit vector) meet, and how its curvature jumps there: what
-    /// [`sweep`](Self::sweep) walks along. `knots` is filled anew; keep it for the next direction.
+    /// Finds where the pieces of the area function along `direction` (a unit vector) meet, and how its second
+    /// derivative jumps there; [`sweep`](Self::sweep) uses them. `knots` is refilled; keep it for the next direction.
     ///
     /// ```
     /// # use nalgebra::Vector3;
@@ -147,7 +148,7 @@ impl SectionAreas {
             let [i, j, k] = corners.map(|v| v as usize);
             let [h, m, n] = [i, j, k].map(|v| heights[v]);
             let (d, e, f) = (m - h, n - m, h - n);
-            // One division for all three: 1 / (d e f) times the side that the corner lacks.
+            // One division for all three: 1 / (d e f) times the edge opposite to the corner.
             let scale = area.dot(direction) / (d * e * f);
             jumps[i] += scale * e;
             jumps[j] += scale * f;
@@ -155,8 +156,8 @@ impl SectionAreas {
         }
     }
 
-    /// Sorts one word a vertex, which is twice as fast as sorting pairs: the upper bits of its height, its index below them. Those few that
-    /// agree in the upper bits are sorted again by all.
+    /// Sorts one word per vertex, which is twice as fast as sorting pairs: the upper bits of its height and its index
+    /// below them. Those few with equal upper bits are sorted again by all bits.
     fn sort(&self, direction: &Vector3<f64>, knots: &mut Knots) {
         let Knots {
             heights, order, keys, ..
@@ -205,7 +206,7 @@ mod tests {
     use rand_distr::{Distribution, UnitSphere};
 
     proptest! {
-        /// The spline is what cutting at a depth measures, for bodies of any topology.
+        /// The spline equals the area measured by cutting at a depth, for bodies of any topology.
         #[test]
         fn areas_are_those_of_polygons(x in -1.0..1.0_f64, y in -1.0..1.0_f64, z in 0.1..1.0_f64, depth in -0.9..0.9_f64, which in 0..3) {
             let mesh = match which {
@@ -222,7 +223,7 @@ mod tests {
                     swept = a + (depth - low) * (b + (depth - low) * c);
                 }
             });
-            // Edges all but level are told by the defect; how rarely, the next test says.
+            // The defect reveals edges that are nearly level; the next test shows how rare they are.
             prop_assume!(defect < 1e-9);
             let mut slicer = Slicer::new(&mesh);
             slicer.turn_to(&normal);
@@ -232,7 +233,7 @@ mod tests {
     }
 
     proptest! {
-        /// Vertices are in order of their heights and level ones of their indices, however near to each other they lie.
+        /// Vertices are ordered by height and equal heights by index, however close they are.
         #[test]
         fn order_is_total(spread in -18..0_i32, level in any::<bool>()) {
             let ball = TriangleMesh::icosphere(1.0, 2);
@@ -249,7 +250,8 @@ mod tests {
         }
     }
 
-    /// Measured: 0, 1 and 0 in ten thousand of cuboid, torus and ball have an edge so level that digits are lost.
+    /// Measured: 0, 1 and 0 of ten thousand directions for cuboid, torus and ball have an edge so level that digits are
+    /// lost.
     #[test]
     fn few_directions_are_refused() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -270,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_edge_is_told() {
+    fn a_level_edge_shows_in_the_defect() {
         let mesh = ClosedMesh::try_from(TriangleMesh::cuboid([1.0; 3])).unwrap();
         let defect = SectionAreas::new(&mesh).sweep(&Vector3::z(), |_, _, _| {});
         assert!(defect.is_nan() || defect > 1e-3);

@@ -19,10 +19,10 @@ pub struct SectionPolygon {
 
 /// The profiles of the section of `mesh` by the plane n·x = `offset`, exact polygons.
 ///
-/// A vertex that lies in the plane counts as above it: the section is that of the plane a hair below. Every triangle with vertices on
-/// both sides adds one edge, and the walk from triangle to triangle closes every contour, so no section of a closed mesh fails.
-/// An island in a hole is a profile of its own. Profiles come in the order of the mesh's triangles. Cost: T, and contours × points
-/// where there are holes.
+/// A vertex in the plane counts as above it: the section is that of a plane infinitesimally below. Every triangle with
+/// vertices on both sides adds one edge, and following neighbouring triangles closes every contour, so no section of a
+/// closed mesh fails. An island in a hole is a profile of its own. Profiles come in the order of the mesh's triangles.
+/// Cost: T, and contours × points where there are holes.
 ///
 /// # Examples
 ///
@@ -115,7 +115,7 @@ impl<'a> Slicer<'a> {
             .extend(self.mesh.vertices().iter().map(|v| v.coords.dot(normal)));
     }
 
-    /// Sum of the areas of all profiles, without telling them apart.
+    /// Total area of all profiles, without separating them.
     pub(crate) fn total_area(&self, offset: f64) -> f64 {
         let mut twice = 0.0;
         let mut reference = None;
@@ -132,7 +132,7 @@ impl<'a> Slicer<'a> {
         0.5 * twice
     }
 
-    /// The profiles cut by the plane, looking only at `candidates` (all the triangles it cuts must be among them).
+    /// The profiles of the plane, visiting only `candidates` (which must include all triangles that it cuts).
     pub(crate) fn profiles(&mut self, offset: f64, candidates: impl IntoIterator<Item = usize>) -> Vec<FlatProfile> {
         let (mut outer, mut holes) = (Vec::new(), Vec::new());
         self.cut += 1;
@@ -141,7 +141,7 @@ impl<'a> Slicer<'a> {
                 continue;
             }
             let contour = self.walk(start, offset);
-            // A plane that only touches a vertex or an edge leaves a contour without area.
+            // A plane that only touches a vertex or an edge gives a contour without area.
             let slit = 1e-13 * perimeter(&contour.points).powi(2);
             if contour.signed_area > slit {
                 outer.push(contour);
@@ -186,7 +186,7 @@ impl<'a> Slicer<'a> {
         self.mesh.triangles()[triangle].map(|i| self.heights[i as usize] >= offset)
     }
 
-    /// Where an edge passes the plane; the same bits from both its triangles.
+    /// Where an edge crosses the plane; the same bits from both of its triangles.
     fn crossing(&self, a: u32, b: u32, offset: f64) -> Point2<f64> {
         let (a, b) = (a.min(b) as usize, a.max(b) as usize);
         let (height_a, height_b) = (self.heights[a], self.heights[b]);
@@ -201,7 +201,7 @@ fn entry(above: [bool; 3]) -> Option<usize> {
     (0..3).find(|&k| above[k] && !above[(k + 1) % 3])
 }
 
-/// The smallest outer contour about the hole.
+/// The smallest outer contour around the hole.
 fn owner(hole: &Contour, profiles: &[FlatProfile]) -> Option<usize> {
     let around = |profile: &FlatProfile| {
         // A hole may touch its outer contour in a point; one of its points is strictly inside.

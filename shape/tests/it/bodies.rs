@@ -1,4 +1,4 @@
-//! Bodies against closed forms and against themselves moved, turned and scaled.
+//! Bodies against closed forms, and against themselves moved, rotated and scaled.
 
 use approx::assert_relative_eq;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -22,9 +22,9 @@ proptest! {
         assert_relative_eq!(mesh.volume(), a * b * c, max_relative = 1e-12);
     }
 
-    /// The largest section of a box holds its longest edge and the diagonal of the other two.
+    /// The largest section of a box contains its longest edge and the diagonal of the other two.
     #[test]
-    fn boxes_are_cut_most_along_the_longest_edge_and_a_diagonal(edges in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64]) {
+    fn largest_section_of_a_box_contains_the_longest_edge_and_a_diagonal(edges in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64]) {
         let [mut a, mut b, mut c] = edges;
         if a > b { std::mem::swap(&mut a, &mut b); }
         if b > c { std::mem::swap(&mut b, &mut c); }
@@ -33,7 +33,7 @@ proptest! {
     }
 
     #[test]
-    fn ellipsoids_are_cut_most_across_their_shortest_axis(axes in [0.3..1.0, 0.3..1.0, 0.3..1.0_f64]) {
+    fn largest_section_of_an_ellipsoid_is_perpendicular_to_its_shortest_axis(axes in [0.3..1.0, 0.3..1.0, 0.3..1.0_f64]) {
         let exact = Body::ellipsoid(axes).unwrap();
         let mesh = ClosedMesh::try_from(exact.to_triangles(2)).unwrap();
         assert_relative_eq!(mesh.mean_width(), exact.mean_width(), max_relative = 0.03);
@@ -43,7 +43,7 @@ proptest! {
     }
 
     #[test]
-    fn measures_do_not_depend_on_place_turn_or_unit(mesh in polytopes(), turn in rotations(), scale in 0.01..100.0_f64) {
+    fn measures_do_not_depend_on_position_orientation_or_unit(mesh in polytopes(), turn in rotations(), scale in 0.01..100.0_f64) {
         let place = |p: &Point3<f64>| Point3::from((turn * p.coords + Vector3::new(3.0, -4.0, 5.0)) * scale);
         let moved = ClosedMesh::try_from(mesh.as_triangle_mesh().mapped(place)).unwrap();
         assert_relative_eq!(moved.volume(), mesh.volume() * scale.powi(3), max_relative = 1e-9);
@@ -52,7 +52,7 @@ proptest! {
         assert_relative_eq!(moved.centroid(), place(&mesh.centroid()), max_relative = 1e-9);
         prop_assert!(moved.is_convex());
         let [own, other] = [mesh, moved].map(|mesh| Body::from_mesh(mesh).size());
-        // Largest sections are searched for: now and then one direction misses the highest summit by a hair.
+        // Largest sections are found by a search that sometimes misses the global maximum slightly.
         assert_relative_eq!(other, own * scale, max_relative = 1e-4);
     }
 
@@ -81,7 +81,7 @@ proptest! {
     }
 
     #[test]
-    fn rocks_are_angular_convex_chips(seed in any::<u64>()) {
+    fn rocks_are_angular_and_convex(seed in any::<u64>()) {
         let rock = Body::rock(seed);
         let mesh = rock.mesh().unwrap();
         prop_assert!(rock.is_convex());
@@ -109,16 +109,16 @@ fn spheroids_have_the_known_mean_width_and_surface() {
 }
 
 #[test]
-fn a_cube_is_cut_most_through_two_opposite_edges() {
+fn largest_section_of_a_cube_contains_two_opposite_edges() {
     let cube = Body::cuboid([1.0; 3]).unwrap();
     assert_relative_eq!(cube.largest_section_area(), 2.0_f64.sqrt(), max_relative = 1e-9);
 }
 
 #[test]
-fn signed_mean_width_counts_profiles_less_holes() {
+fn signed_mean_width_counts_profiles_minus_holes() {
     // An L of three unit cubes: right angles along 21 of length, one of 1 concave: (21 - 1) (π/2) / 4π.
     assert_relative_eq!(fat_l().signed_mean_width(), 20.0 / 8.0, max_relative = 1e-12);
-    // Section of a hollow cube: profile less hole is that of two cubes.
+    // Section of a hollow cube: profiles minus holes are those of two cubes.
     assert_relative_eq!(hollow_cube().signed_mean_width(), 3.0 - 1.5, max_relative = 1e-12);
     // Smooth torus: the integral of mean curvature is 2π² R, so H = π R; the mesh is near.
     let fine = ClosedMesh::try_from(TriangleMesh::torus(2.0, 0.7, 96, 48)).unwrap();

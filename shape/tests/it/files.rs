@@ -1,4 +1,4 @@
-//! Mesh files: what goes out comes back, what is broken is refused with its place.
+//! Mesh files: round trips, and errors with their place for broken files.
 
 use nalgebra::Point3;
 use proptest::prelude::*;
@@ -45,7 +45,7 @@ proptest! {
         }
     }
 
-    /// No file of arbitrary bytes does worse than an error.
+    /// Arbitrary bytes give a mesh or an error, never a panic.
     #[test]
     fn any_bytes_give_a_mesh_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..300), cut in 0..700_usize, at in 0..700_usize) {
         for name in ["m.obj", "m.stl", "m.ply"] {
@@ -104,7 +104,7 @@ endsolid tetrahedron
 ";
 
 #[test]
-fn text_stl_is_read_in_double_precision_and_cuts_are_noticed() {
+fn text_stl_is_read_in_double_precision_and_truncation_is_an_error() {
     let (_folder, path) = file("t.stl", TETRAHEDRON_STL);
     let mesh = ClosedMesh::try_from(read_mesh(&path).unwrap()).unwrap();
     assert_eq!(mesh.vertices().len(), 4);
@@ -122,7 +122,7 @@ fn text_stl_is_read_in_double_precision_and_cuts_are_noticed() {
 }
 
 #[test]
-fn a_binary_stl_cut_short_says_how_much_is_missing() {
+fn the_error_of_a_truncated_binary_stl_states_both_lengths() {
     let mut bytes = written("c.stl", &TriangleMesh::cuboid([1.0; 3]));
     bytes.truncate(bytes.len() - 7);
     let expected = MeshFileFault::Length {

@@ -1,4 +1,4 @@
-//! Laws that bodies, meshes and particles obey, on random and on analytic examples.
+//! Properties of bodies, meshes and particles, on random and on analytic examples.
 
 #![allow(
     clippy::unwrap_used,

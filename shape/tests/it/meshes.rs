@@ -1,4 +1,4 @@
-//! What is repaired, what is refused and with which place; hulls.
+//! Repairs of meshes, errors and their positions; convex hulls.
 
 use approx::assert_relative_eq;
 use nalgebra::Point3;
@@ -16,7 +16,7 @@ fn closed(mesh: TriangleMesh) -> Result<ClosedMesh, MeshError> {
 }
 
 #[test]
-fn an_open_mesh_is_refused_with_its_edges() {
+fn an_open_mesh_is_an_error_with_its_edges() {
     let mut open = cube();
     open.triangles.remove(0);
     let error = closed(open).unwrap_err();
@@ -50,7 +50,7 @@ fn three_sheets_at_an_edge_are_refused() {
 }
 
 #[test]
-fn numbers_are_checked_with_their_place() {
+fn numbers_are_checked_and_their_position_is_reported() {
     let mut nan = cube();
     nan.vertices[5].y = f64::NAN;
     assert_eq!(closed(nan).unwrap_err(), MeshError::NotFinite { vertex: 5 });
@@ -74,7 +74,7 @@ fn numbers_are_checked_with_their_place() {
 }
 
 #[test]
-fn far_large_and_small_meshes_measure_right() {
+fn distant_large_and_small_meshes_are_measured_correctly() {
     for scale in [1e-30, 1e-3, 1e30] {
         let mesh = closed(cube().mapped(|p| p * scale)).unwrap();
         assert_relative_eq!(mesh.volume() / scale / scale / scale, 1.0, max_relative = 1e-12);
@@ -87,7 +87,7 @@ fn far_large_and_small_meshes_measure_right() {
 }
 
 #[test]
-fn an_inverted_mesh_is_turned_and_said() {
+fn an_inverted_mesh_is_reversed_and_reported() {
     let mut inverted = cube();
     inverted.triangles.iter_mut().for_each(|t| t.swap(0, 2));
     let mesh = closed(inverted).unwrap();
@@ -111,12 +111,12 @@ fn a_soup_of_separate_triangles_is_welded() {
 }
 
 #[test]
-fn duplicates_flaps_and_degenerate_triangles_go() {
+fn duplicates_flaps_and_degenerate_triangles_are_dropped() {
     let mut mesh = cube();
     let [a, b, c] = mesh.triangles[4];
     mesh.triangles.push([b, c, a]);
     mesh.triangles.push([a, a, b]);
-    // A flap: the same triangle both ways, hanging in the air.
+    // A flap: the same triangle in both orientations, attached to nothing.
     mesh.vertices
         .extend([[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0], [9.0, 9.0, 9.0]].map(Point3::from));
     mesh.triangles.extend([[8, 9, 10], [8, 10, 9]]);
@@ -168,7 +168,8 @@ fn cavities_are_subtracted_and_bodies_apart_added() {
 
 #[test]
 fn triangles_without_area_do_not_spoil_angles() {
-    // A cube with a vertex in the middle of an edge, used from one side only: a triangle of three corners on a line fills the gap.
+    // A cube with a vertex in the middle of an edge, used from one side only: a triangle of three corners on a line
+    // fills the gap.
     let mut mesh = cube();
     let edge = mesh.triangles[0];
     mesh.vertices.push(nalgebra::center(
@@ -186,9 +187,9 @@ fn triangles_without_area_do_not_spoil_angles() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// No point is outside any face of the hull, by more than rounding of this test's own arithmetic.
+    /// No point is outside any face of the hull by more than the rounding of this test.
     #[test]
-    fn hulls_hold_all_their_points(points in points(4..200)) {
+    fn hulls_contain_all_their_points(points in points(4..200)) {
         let hull = convex_hull(&points).unwrap();
         for &[a, b, c] in hull.triangles() {
             let [a, b, c] = [a, b, c].map(|i| hull.vertices()[i as usize]);
@@ -201,7 +202,7 @@ proptest! {
         prop_assert!(hull.is_convex());
     }
 
-    /// Points on a grid: many in one plane, on one line or at one place.
+    /// Points on a grid: many in one plane, on one line or at one position.
     #[test]
     fn hulls_of_grid_points_are_sound(cells in prop::collection::vec([0..3_u8, 0..3_u8, 0..3_u8], 4..60)) {
         let points: Vec<Point3<f64>> = cells.iter().map(|c| Point3::from(c.map(f64::from))).collect();
@@ -235,14 +236,14 @@ proptest! {
 }
 
 #[test]
-fn non_convex_bodies_are_known() {
+fn non_convex_bodies_are_recognised() {
     assert!(!fat_l().is_convex() && !torus().is_convex() && !hollow_cube().is_convex());
     assert_relative_eq!(fat_l().volume(), 3.0, max_relative = 1e-12);
 }
 
-/// Closed and manifold by its edges, and yet no solid: the place is told.
+/// Closed and manifold by its edges, but not a solid: the position is reported.
 #[test]
-fn a_mesh_that_cuts_through_itself_is_refused() {
+fn a_mesh_that_intersects_itself_is_an_error() {
     let ball = TriangleMesh::icosphere(1.0, 3);
     let two = ball.clone().with(&ball.mapped(|p| Point3::new(p.x + 0.7, p.y, p.z)));
     let error = closed(two).unwrap_err();
@@ -262,16 +263,16 @@ fn a_mesh_that_cuts_through_itself_is_refused() {
     assert!(error.to_string().contains("cuts through itself"));
 }
 
-/// Speed: 20,480 triangles within a second or so even unoptimised; 100,000 take some tenths of a second in release.
+/// 20,480 triangles take about a second even unoptimised; 100,000 take some tenths of a second in release.
 #[test]
-fn crossings_are_looked_for_fast() {
+fn the_search_for_crossings_is_fast() {
     let start = std::time::Instant::now();
     assert!(closed(TriangleMesh::icosphere(1.0, 5)).is_ok());
     assert!(start.elapsed().as_secs() < 20);
 }
 
 #[test]
-fn seams_that_do_not_meet_are_welded_on_request() {
+fn seams_that_do_not_match_are_welded_on_request() {
     let cube = cube();
     let soup: Vec<Point3<f64>> = cube
         .triangles
@@ -317,7 +318,7 @@ proptest! {
 
 /// Coordinates so small that products of them vanish (found by fuzzing): a needle of no thickness beside a box.
 #[test]
-fn vanishing_coordinates_are_set_to_zero_and_said() {
+fn vanishing_coordinates_are_set_to_zero_and_reported() {
     let mut dented = cube().mapped(|p| Point3::new(p.x + 0.5, p.y + 0.5, p.z + 0.5));
     dented.vertices[0].x = 1e-320;
     dented.vertices[1].y = -3e-231;

@@ -50,7 +50,7 @@ proptest! {
         }
     }
 
-    /// Moving straight away from the nearest point by h changes the distance by h: the distance has slope 1, its gradient is unit.
+    /// Moving away from the nearest point by h changes the distance by h: its gradient has length 1.
     #[test]
     fn distances_have_slope_one(axes in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64], p in [-1.0..1.0, -1.0..1.0, -1.0..1.0_f64]) {
         let body = UnitBody::new(&Body::ellipsoid(axes).unwrap());
@@ -67,7 +67,7 @@ proptest! {
         }
     }
 
-    /// Never more than the distance, inside it exactly.
+    /// The bound is never above the distance, and equal to it inside.
     #[test]
     fn bounds_are_below_the_distance(mesh in polytopes(), axes in [0.2..1.0, 0.2..1.0, 0.2..1.0_f64], points in points(40..41)) {
         let bodies = [unit(mesh), UnitBody::new(&Body::ellipsoid(axes).unwrap()), UnitBody::new(&Body::sphere(2.0).unwrap())];
@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn many_faces_answer_as_few_do(points in points(60..61)) {
+    fn bodies_with_many_faces_give_the_same_results_as_with_few(points in points(60..61)) {
         for p in points {
             let distance = p.coords.norm() - 0.5;
             prop_assert!((FINE_SPHERE.signed_distance(&p) - distance).abs() < 0.01);
@@ -104,7 +104,7 @@ proptest! {
 }
 
 #[test]
-fn ellipsoid_distance_is_right_on_the_axes_and_in_the_middle() {
+fn ellipsoid_distance_is_correct_on_the_axes_and_at_the_centre() {
     let axes = [1.0, 2.0, 4.0];
     let body = Body::ellipsoid(axes).unwrap();
     let unit = UnitBody::new(&body);
@@ -114,7 +114,8 @@ fn ellipsoid_distance_is_right_on_the_axes_and_in_the_middle() {
     assert_relative_eq!(at(3.0, 0.0, 0.0), 2.0, max_relative = 1e-12);
     assert_relative_eq!(at(0.0, 0.0, 6.0), 2.0, max_relative = 1e-12);
     assert_relative_eq!(at(0.5, 0.0, 0.0), -0.5, max_relative = 1e-12);
-    // Inside on the longest axis, nearer than the radius of curvature a²/c from its end: the end itself; else a circle of points.
+    // Inside on the longest axis, nearer than the radius of curvature a²/c from its end: the end itself; else a circle
+    // of points.
     assert_relative_eq!(at(0.0, 0.0, 3.9), -0.1, max_relative = 1e-9);
     let (z, a, c) = (2.0_f64, 1.0_f64, 4.0_f64);
     let gap = c * c - a * a;
@@ -149,7 +150,8 @@ fn the_centroid_of_a_torus_is_outside() {
     assert_eq!(body.inscribed_radius(), 0.0);
 }
 
-/// Points along the edges of a turned cube lie off them by rounding, so its hull has slivers; their normals, which are noise, must cut nothing off.
+/// Points along the edges of a turned cube lie off them by rounding, so its hull has slivers; their normals, which are
+/// noise, must not cut anything off.
 #[test]
 fn slivers_cut_nothing_off() {
     let turn = nalgebra::Rotation3::from_euler_angles(0.3, 0.5, 0.7);

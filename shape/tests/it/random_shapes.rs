@@ -1,4 +1,4 @@
-//! What the laws are tried on.
+//! Shapes for the tests.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, UnitVector3, Vector3};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Sections: what integrates to the volume, what counts as one profile.
+//! Sections: areas that integrate to the volume, and separate profiles.
 
 use approx::assert_relative_eq;
 use nalgebra::{UnitVector3, Vector3};
@@ -105,7 +105,7 @@ fn planes_through_vertices_edges_and_faces_cut_whole_profiles() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// ∫ A dh = V for every direction, whatever the body.
+    /// ∫ A dh = V for every direction and every body.
     #[test]
     fn areas_add_up_to_the_volume(mesh in polytopes(), normal in directions(), seed in 0_u64..50) {
         let rough = Body::rough_rock(seed, 0.08).unwrap();

@@ -207,7 +207,7 @@ fn damaged_solids_are_refused() {
             "stereology.solid/7\",\"new\":1,\"binder_of_7\":0",
             "stereology.solid/7",
         ),
-        ("solid.json", "\"voxel\":2.0", "\"voxel\":0.0", "voxel 0"),
+        ("solid.json", "\"voxel\":2.0", "\"voxel\":0.0", "edge 0"),
         (
             "solid.json",
             "\"colours\":[[",

@@ -1,4 +1,4 @@
-//! A baked atlas shows on the mesh what the solid is there.
+//! A baked atlas shows the solid's colours on the mesh.
 
 use std::ops::ControlFlow;
 
@@ -47,7 +47,7 @@ fn bake(solid: &Solid, mesh: &TriangleMesh, pixels: u32) -> Baked {
         .unwrap()
 }
 
-/// What a viewer shows: the four nearest texels in proportion.
+/// Bilinear filtering, as in a viewer.
 fn bilinear(texture: &Texture, [u, v]: [f64; 2]) -> [f64; 4] {
     let (x, y) = (u * f64::from(texture.width) - 0.5, v * f64::from(texture.height) - 0.5);
     let mut colour = [0.0; 4];
@@ -62,7 +62,7 @@ fn bilinear(texture: &Texture, [u, v]: [f64; 2]) -> [f64; 4] {
     colour
 }
 
-/// The three corners of each triangle, then random points of it: on the mesh, and in the picture.
+/// The three corners of each triangle, then random points of it: on the mesh, and in the texture.
 fn seen_points(baked: &Baked, each: usize) -> Vec<(Point3<f64>, [f64; 2])> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut points = Vec::new();
@@ -98,13 +98,14 @@ fn somewhere(body: &Body, scale: f64) -> TriangleMesh {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(10))]
 
-    /// Farther from any border than the texels that a lookup blends, the picture has the solid's colour to rounding, at corners and edges too; elsewhere it is between the colours there.
+    /// Farther from any border than the texels that a lookup blends, the texture has the solid's colour to rounding, at
+    /// corners and edges too; elsewhere it is between the nearby colours.
     #[test]
-    fn the_picture_is_the_solid(seed in 0_u64..99, edges in prop::array::uniform3(3.0..9.0_f64), pixels in 150_u32..400) {
+    fn the_texture_shows_the_solid(seed in 0_u64..99, edges in prop::array::uniform3(3.0..9.0_f64), pixels in 150_u32..400) {
         let solid = balls();
         for mesh in [somewhere(&Body::cuboid(edges).unwrap(), 1.0), somewhere(&Body::rock(seed), 6.0)] {
             let baked = bake(&solid, &mesh, pixels);
-            // A lookup at the edge of a texel blends points up to 3/2 texels away each way.
+            // A lookup at the edge of a texel blends points up to 3/2 texels away along each axis.
             let blur = 1.5 * 2.0_f64.sqrt() * baked.texel;
             let (mut error, mut near, mut count) = (0.0, 0.0, 0.0);
             for (p, uv) in seen_points(&baked, 40) {
@@ -126,9 +127,9 @@ proptest! {
     }
 }
 
-/// Two triangles share a face of a cube, and few texels are spent on nothing.
+/// The two triangles of a face of a cube share a chart, and few texels are unused.
 #[test]
-fn room_is_used() {
+fn little_of_the_texture_is_unused() {
     let solid = balls();
     let cube = bake(&solid, &somewhere(&Body::cuboid([6.0; 3]).unwrap(), 1.0), 512);
     assert_eq!(cube.charts, 6);
@@ -166,9 +167,9 @@ fn the_same_bytes_at_any_number_of_threads() {
     assert!(with(1) == with(3));
 }
 
-/// Open meshes, edges of three triangles, slivers, lines and points: each has its place.
+/// Open meshes, edges of three triangles, slivers, lines and points all get a chart.
 #[test]
-fn any_triangles_will_do() {
+fn any_triangles_can_be_baked() {
     let solid = balls();
     let at = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
     let mesh = TriangleMesh {
@@ -204,9 +205,9 @@ fn any_triangles_will_do() {
     }
 }
 
-/// How coarse the picture is, is told in voxels of the residual.
+/// The coarseness of the texture is measured in voxels of the residual.
 #[test]
-fn coarseness_is_told() {
+fn coarseness_is_reported() {
     let ripple = Array4::from_elem((20, 20, 20, 3), 0.01_f32);
     let residual = Residual {
         particles: ripple.clone(),
@@ -227,7 +228,7 @@ fn coarseness_is_told() {
 }
 
 #[test]
-fn what_cannot_be_baked_is_refused() {
+fn invalid_input_of_baking_is_an_error() {
     let solid = balls();
     let refused = |mesh: &TriangleMesh, pixels: u32| {
         let options = BakeOptions {
@@ -241,7 +242,7 @@ fn what_cannot_be_baked_is_refused() {
     for pixels in [0, 16_385] {
         assert_eq!(refused(&ball, pixels), CarveError::Pixels { pixels });
     }
-    // What is said to be enough is, and one less is not.
+    // The reported side is sufficient, and one texel less is not.
     let CarveError::Crowded { enough, .. } = refused(&ball, 20) else {
         panic!("not crowded")
     };

@@ -1,4 +1,4 @@
-//! What does not make a solid or a picture is refused with a reason.
+//! Invalid solids and images are errors with a reason.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::Array4;
@@ -29,7 +29,7 @@ fn refused(particle: Particle) -> SolidError {
 }
 
 #[test]
-fn particles_that_do_not_make_a_solid_are_named() {
+fn particles_that_do_not_make_a_solid_are_reported() {
     assert!(matches!(
         refused(Particle {
             size: 9.0,
@@ -58,7 +58,7 @@ fn particles_that_do_not_make_a_solid_are_named() {
 }
 
 #[test]
-fn colours_are_one_a_particle_and_finite() {
+fn colours_are_one_per_particle_and_finite() {
     assert!(matches!(
         solid(vec![particle()], vec![], None),
         Err(SolidError::Colours { .. })
@@ -107,7 +107,7 @@ fn residuals_fit_the_box() {
 }
 
 #[test]
-fn pictures_and_planes_that_cannot_be_are_refused() {
+fn invalid_images_and_planes_are_errors() {
     let solid = solid(vec![], vec![], None).unwrap();
     let plane = SlicePlane::across(Axis::X, 1.0);
     for (width, height, pixel) in [(0, 1, 1.0), (u32::MAX, u32::MAX, 1.0), (1, 1, 0.0), (1, 1, f64::NAN)] {
@@ -130,6 +130,6 @@ fn pictures_and_planes_that_cannot_be_are_refused() {
         let p = SlicePlane::oblique(normal, 1.0).unwrap().point(2.0, 3.0);
         assert!((p.coords.dot(&(normal / normal.amax()).normalize()) - 1.0).abs() < 1e-12);
     }
-    // Points at infinity have no place in the box; they are in the binder or in a particle, but never a panic.
+    // Points at infinity have no position in the box; any result is valid, but no panic.
     let _ = solid.id_at(&Point3::new(f64::NAN, f64::INFINITY, 1e300));
 }

@@ -44,9 +44,10 @@ fn carve(solid: &Solid, mesh: &TriangleMesh, options: &CarveOptions) -> Carved {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Bisection keeps a closed mesh closed, its volume and surface to rounding, and its triangles no worse than half the smallest angle.
+    /// Bisection keeps a closed mesh closed, its volume and surface to rounding, and its triangles no worse than half
+    /// the smallest angle.
     #[test]
-    fn the_surface_stays_what_it_was(size in 2.0..16.0_f64, edges in prop::array::uniform3(4.0..15.0_f64), seed in 0_u64..99) {
+    fn the_surface_does_not_change(size in 2.0..16.0_f64, edges in prop::array::uniform3(4.0..15.0_f64), seed in 0_u64..99) {
         let solid = solid(size);
         for body in [Body::cuboid(edges).unwrap(), Body::rock(seed)] {
             let before = body.mesh().unwrap().clone();
@@ -68,7 +69,7 @@ proptest! {
 
 /// Every edge of two voxels and more shows the colours between its ends.
 #[test]
-fn edges_are_as_fine_as_the_texture_asks() {
+fn edges_resolve_the_texture() {
     let solid = solid(9.0);
     let mut cube = TriangleMesh::cuboid([16.0, 16.0, 0.5]);
     cube.vertices
@@ -84,7 +85,7 @@ fn edges_are_as_fine_as_the_texture_asks() {
             if (q - p).norm() >= 2.0 {
                 let seen = solid.colour_at(&center(&p, &q));
                 let between = |c: usize| 0.5 * (carved.coloured.colours[a][c] + carved.coloured.colours[b][c]);
-                // The middle is not among the points that were looked at where the number of steps is odd; the ripple adds its own 0.04.
+                // For an odd number of steps the middle was not sampled; the ripple adds its own 0.04.
                 assert!((0..3).all(|c| (seen[c] - between(c)).abs() < 0.09), "{p} {q}");
             }
         }
@@ -101,7 +102,7 @@ fn edges_are_as_fine_as_the_texture_asks() {
 }
 
 #[test]
-fn what_cannot_be_carved_is_refused() {
+fn invalid_input_of_carving_is_an_error() {
     let solid = solid(9.0);
     let refused = |mesh: &TriangleMesh, options: CarveOptions| {
         solid

@@ -56,9 +56,9 @@ fn without_its_residual_a_solid_has_mean_colours() {
     }
 }
 
-/// A picture of pixels as large as the residual's voxels shows the voxels themselves, clamped only as bytes.
+/// An image with pixels as large as the residual's voxels shows the voxels themselves, clamped only as bytes.
 #[test]
-fn pictures_at_the_photographs_scale_show_the_residual_unblurred() {
+fn images_at_the_photographs_scale_show_the_residual_unblurred() {
     let solid = textured(2).with_border_samples(1).unwrap();
     let picture = solid.slice(&SlicePlane::across(Axis::Z, 0.25), 16, 16, 0.5).unwrap();
     for (x, y, pixel) in picture.enumerate_pixels() {

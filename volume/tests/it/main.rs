@@ -1,4 +1,4 @@
-//! Laws of solids, judged by analytic spheres and by brute force.
+//! Properties of solids, tested against analytic spheres and brute force.
 #![allow(clippy::float_cmp, reason = "what must be the same is the same to the last bit")]
 #![expect(clippy::unwrap_used, reason = "a failing test panics")]
 

@@ -1,4 +1,5 @@
-//! What is at a point: the cells against a search through all particles and images, and the answers against each other.
+//! Point queries: the search grid against brute force over all particles and images, and the results against each
+//! other.
 
 use crate::spheres::{mixture, solid_of, spheres};
 use nalgebra::{Point3, Vector3};
@@ -33,7 +34,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn the_particle_is_the_one_that_a_search_through_all_finds(seed in 0_u64..4, points in prop::collection::vec(point(), 24)) {
+    fn the_particle_is_the_one_found_by_brute_force(seed in 0_u64..4, points in prop::collection::vec(point(), 24)) {
         let solid = mixture(seed);
         for p in points {
             let p = solid.period().wrap(&p);
@@ -63,7 +64,7 @@ proptest! {
         prop_assert_eq!(solid.distance_at(&p), solid.distance_at(&moved));
     }
 
-    /// Many points are looked up in another order than they are given in.
+    /// Many points are evaluated in another order than given.
     #[test]
     fn colours_come_in_the_order_of_their_points(seed in 0_u64..4, points in prop::collection::vec(point(), 0..200)) {
         let solid = mixture(seed);
@@ -81,9 +82,9 @@ proptest! {
     }
 }
 
-/// A body longer than the box meets itself; all its images count.
+/// A body longer than the box overlaps its own images; all of them count.
 #[test]
-fn a_particle_longer_than_the_box_is_everywhere_it_should_be() {
+fn all_images_of_a_particle_longer_than_the_box_count() {
     let sides = [1.0, 4.0, 4.0];
     let needle = Body::ellipsoid([3.0, 1.0, 1.0]).unwrap();
     let solid = solid_of(&[needle], &[(Point3::new(0.25, 1.0, 1.0), 0.5)], sides);

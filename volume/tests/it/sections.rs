@@ -1,4 +1,4 @@
-//! Sections: exact profiles against the formulas of spheres, pictures against profiles.
+//! Sections: exact profiles against the formulas for spheres, images against profiles.
 
 use crate::spheres::{mixture, spheres};
 use nalgebra::Vector3;
@@ -37,7 +37,8 @@ proptest! {
         }
     }
 
-    /// The pixels whose centres lie in a profile cover its area but for those on its rim: at most the ring of half a pixel's diagonal to both sides, 2π r √2 pixel.
+    /// The pixels whose centres lie in a profile cover its area except at its border: at most the ring of half a
+    /// pixel's diagonal to both sides, 2π r √2 pixel.
     #[test]
     fn pixels_cover_the_profiles(seed in 0_u64..4, depth in 0.0..8.0_f64, axis in 0_usize..3) {
         let solid = spheres(seed);
@@ -52,7 +53,8 @@ proptest! {
     }
 }
 
-/// Delesse and eq. (1) on one solid: planes at equal steps through the period find area fraction = volume fraction, profiles per area = Σ d per volume, and a mean profile of Σ π d³/6 over Σ d.
+/// Delesse and eq. (1) on one solid: planes at equal steps through the period find area fraction = volume fraction,
+/// profiles per area = Σ d per volume, and a mean profile of Σ π d³/6 over Σ d.
 #[test]
 fn planes_through_the_period_measure_the_solid() {
     let solid = spheres(1);
@@ -66,16 +68,18 @@ fn planes_through_the_period_measure_the_solid() {
             .collect();
         let (count, total) = (profiles.len() as f64, profiles.iter().sum::<f64>());
         let examined = area * f64::from(steps);
-        // A sphere of diameter d is met by d / step planes, one more or less: under 1 in 2000 of the smallest.
+        // A sphere of diameter d is cut by d / step planes, plus or minus one: an error under 1 in 2000 for the
+        // smallest.
         assert!((count / examined / (sum(1) / volume) - 1.0).abs() < 1e-3);
         assert!((total / examined / (PI / 6.0 * sum(3) / volume) - 1.0).abs() < 1e-6);
         assert!((total / count / (PI / 6.0 * sum(3) / sum(1)) - 1.0).abs() < 1e-3);
     }
 }
 
-/// The sum of a picture's values over its area is the sum of its profiles' colours over theirs: border pixels are shared in proportion.
+/// The integral of an image is the sum of the profiles' colours times their areas: border pixels mix colours in
+/// proportion.
 #[test]
-fn pictures_share_border_pixels_in_proportion() {
+fn border_pixels_mix_colours_in_proportion() {
     let solid = spheres(2);
     let (n, depth) = (128, 3.1);
     let pixel = 8.0 / f64::from(n);
@@ -93,7 +97,8 @@ fn pictures_share_border_pixels_in_proportion() {
     }
 }
 
-/// A picture has hard pixels inside and mixed ones on borders; without border samples it has the colours of centres only.
+/// An image has pure pixels inside profiles and mixed ones on borders; without border samples all pixels have the
+/// colours of their centres.
 #[test]
 fn border_samples_can_be_turned_off() {
     let solid = mixture(0);

@@ -1,4 +1,4 @@
-//! Solids of spheres without overlap, placed one at a time at random: everything about them is known.
+//! Solids of spheres without overlap, placed one at a time at random: their properties are known exactly.
 
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -7,7 +7,8 @@ use std::sync::LazyLock;
 use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody, isotropic_rotation};
 use stereology_volume::Solid;
 
-/// Positions and sizes that do not overlap, in a box of sides that are exact in binary, so that a step of a period is exact.
+/// Positions and sizes that do not overlap, in a box of sides that are exact in binary, so that a step of a period is
+/// exact.
 pub(crate) fn placed(seed: u64, wanted: usize, sides: [f64; 3], sizes: [f64; 2]) -> Vec<(Point3<f64>, f64)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let period = PeriodicBox::new(sides.into()).unwrap();
@@ -25,7 +26,7 @@ pub(crate) fn placed(seed: u64, wanted: usize, sides: [f64; 3], sizes: [f64; 2])
     placed
 }
 
-/// Particles of a body, turned at random and of random categories and colours.
+/// Particles with random orientations, categories and colours.
 pub(crate) fn solid_of(bodies: &[Body], placed: &[(Point3<f64>, f64)], sides: [f64; 3]) -> Solid {
     let mut rng = ChaCha8Rng::seed_from_u64(99);
     let bodies: Vec<UnitBody> = bodies.iter().map(UnitBody::new).collect();
@@ -62,9 +63,9 @@ pub(crate) fn spheres(seed: u64) -> Solid {
     )
 }
 
-/// Three kinds of bodies in a box that is no cube; rocks and ellipsoids reach beyond their size and may overlap.
+/// Three kinds of bodies in a box that is not a cube; rocks and ellipsoids extend beyond their size and may overlap.
 pub(crate) fn mixture(seed: u64) -> Solid {
-    // The largest section of a rock takes a while to find.
+    // The largest section of a rock takes some time to find.
     static BODIES: LazyLock<[Body; 3]> = LazyLock::new(|| {
         [
             Body::sphere(1.0).unwrap(),

@@ -1,4 +1,4 @@
-//! Voids are where their particles are, and nowhere else.
+//! Voids are exactly at their particles.
 
 use std::ops::ControlFlow;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use stereology_shape::{Arrangement, Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
 use stereology_volume::{CarveOptions, Solid, SolidError};
 
-/// A bubble and a rock beside it, in a box of side 20.
+/// A bubble and a rock, in a box of side 20.
 fn foam(size: f64) -> Solid {
     let bodies = vec![
         UnitBody::new(&Body::sphere(1.0).unwrap()),
@@ -80,7 +80,7 @@ fn carved_meshes_have_holes() {
 }
 
 #[test]
-fn voids_are_shapes_that_exist() {
+fn voids_must_be_existing_shapes() {
     assert_eq!(
         foam(5.0).with_voids(&[0, 2]).unwrap_err(),
         SolidError::Void { shape: 2, bodies: 2 }

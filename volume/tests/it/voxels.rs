@@ -1,4 +1,5 @@
-//! Voxels: volumes and slabs of spheres within the bounds of discretisation, channels that agree, the same bytes at any number of threads.
+//! Voxels: volumes and slabs of spheres within the bounds of discretisation, channels that agree, the same bytes at any
+//! number of threads.
 
 use crate::spheres::{mixture, spheres};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -24,8 +25,9 @@ fn ids(solid: &Solid, n: usize) -> Array3<u32> {
     ids
 }
 
-/// Voxels that the surface does not cut are right, so a sphere's volume in voxels is off by less than the shell of half a voxel's diagonal δ to both sides of its surface. The errors of many spheres cancel: their sum is
-/// within a hundredth of the sum of the shells.
+/// Voxels not cut by the surface are correct, so the error of a sphere's volume in voxels is less than the shell within
+/// half a voxel's diagonal δ of its surface. The errors of many spheres cancel: their sum is within a hundredth of the
+/// sum of the shells.
 #[test]
 fn the_fraction_of_voxels_is_the_volume_of_the_spheres() {
     let n = 96;
@@ -48,7 +50,8 @@ fn the_fraction_of_voxels_is_the_volume_of_the_spheres() {
     }
 }
 
-/// A slab of voxels is the section at the height of its centres: circles of area π (r² − h²) within the ring of half a pixel's diagonal.
+/// A slab of voxels is the section at the z of its centres: circles of area π (r² − h²) within the ring of half a
+/// pixel's diagonal.
 #[test]
 fn slabs_of_voxels_are_sections() {
     let n = 96;
@@ -118,8 +121,9 @@ fn channels_agree_in_files() {
     }
 }
 
-/// Voxels are filled row by row; every one is what is said of its centre, bit for bit: spheres, ellipsoids, boxes whose faces lie along the rows, rocks, and tori, which have no chords; overlapping, reaching over the box, some of them voids,
-/// read in every way between the residual's voxels.
+/// Voxels are filled row by row; each equals the result at its centre, bit for bit: spheres, ellipsoids, boxes with
+/// faces along the rows, rocks, and tori, which have no chords; overlapping, extending beyond the box, some of them
+/// voids, read in every way between the residual's voxels.
 #[test]
 fn rows_of_voxels_are_their_points() {
     let torus = TriangleMesh::torus(2.0, 0.8, 24, 12);
@@ -138,7 +142,7 @@ fn rows_of_voxels_are_their_points() {
             size: 0.5 + 2.0 * rng.random::<f64>(),
             category: 0,
             position: Point3::from(Vector3::from_fn(|_, _| 8.0 * rng.random::<f64>())),
-            // Some lie straight, their faces through the centres of voxels.
+            // Some are axis-aligned, with faces through the centres of voxels.
             orientation: if i % 3 == 0 {
                 UnitQuaternion::identity()
             } else {
@@ -188,7 +192,7 @@ fn rows_of_voxels_are_their_points() {
     }
 }
 
-/// Slabs may lie in memory as they like, here with y as the fastest axis.
+/// Slabs may have any memory layout, here with y as the fastest axis.
 #[test]
 fn slabs_may_have_any_strides() {
     let solid = mixture(2);
@@ -222,7 +226,7 @@ fn bytes_do_not_depend_on_threads() {
 }
 
 #[test]
-fn cancelling_leaves_nothing() {
+fn cancelling_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let stop = |done: f64| {
         if done > 0.5 {
@@ -238,7 +242,8 @@ fn cancelling_leaves_nothing() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// The box filter keeps the mean colour whatever the resolution: that of a sphere's share of the box, to the steps of its points.
+/// The box filter keeps the mean colour at any resolution: that of the sphere's volume fraction, to the resolution of
+/// its points.
 #[test]
 fn a_filtered_volume_has_the_solids_mean_colour() {
     let particle = Particle {

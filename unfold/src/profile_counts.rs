@@ -300,8 +300,8 @@ impl ProfileCounts {
         self.slices.as_ref().map(Vec::len)
     }
 
-    /// At least so many slices, those beyond what profiles told without any: for a part of the profiles that has none
-    /// on the last slices.
+    /// At least so many slices, those beyond the recorded ones without profiles: for a part of the profiles that has
+    /// none on the last slices.
     ///
     /// ```
     /// use stereology_unfold::ProfileCounts;

@@ -1,5 +1,5 @@
-//! Several types whose profiles cannot be told apart, in unknown fractions, with one size distribution: eqs. (10)-(12)
-//! where P(i) is sought as well.
+//! Several types whose profiles cannot be distinguished, in unknown fractions, with one size distribution: eqs.
+//! (10)-(12) where P(i) is sought as well.
 //!
 //! Often the counts cannot tell: a broad distribution of one type and a slightly different one of another show the same
 //! profiles. Then the answer is that.

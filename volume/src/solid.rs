@@ -109,7 +109,8 @@ impl Solid {
         Self { lookup, ..self }
     }
 
-    /// Images take the mean of n × n points of a pixel on the border of a particle: from 1 (the centre only) to 16; the default is 4.
+    /// Images take the mean of n × n points of a pixel on the border of a particle: from 1 (the centre only) to 16; the
+    /// default is 4.
     ///
     /// # Errors
     ///

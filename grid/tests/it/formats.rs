@@ -139,8 +139,8 @@ fn tiff_tells_the_spacing() {
         let mut decoder = Decoder::new(File::open(&file).unwrap()).unwrap();
         for (tag, spacing) in [(Tag::XResolution, spacing[0]), (Tag::YResolution, spacing[1])] {
             let fraction = decoder.get_tag_u32_vec(tag).unwrap();
-            let told = f64::from(fraction[1]) / f64::from(fraction[0]);
-            assert!((told / spacing - 1.0).abs() < 1e-6, "{tag:?} {told}");
+            let found = f64::from(fraction[1]) / f64::from(fraction[0]);
+            assert!((found / spacing - 1.0).abs() < 1e-6, "{tag:?} {found}");
         }
         let description = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap();
         assert!(

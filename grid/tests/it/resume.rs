@@ -1,4 +1,4 @@
-//! A volume gone on with is the volume written at a stretch, byte for byte.
+//! A resumed volume equals the volume written without interruption, byte for byte.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +16,7 @@ fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     }
 }
 
-/// Writes a volume of `sample`, broken off before the slab `end`, and tells which slabs were asked for.
+/// Writes a volume of `sample`, cancelled before the slab `end`, and returns which slabs were requested.
 fn write<T: Element>(
     path: &Path,
     shape: VolumeShape,

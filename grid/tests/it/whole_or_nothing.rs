@@ -74,7 +74,7 @@ fn a_folder_appears_whole_or_not_at_all() {
     assert!(thesis.join("thesis.tex").exists());
 }
 
-/// Slabs are written beside their computation: what stops the writing is told, and stops the computing too.
+/// Slabs are written while others are computed: an error of writing is returned and stops the computation.
 #[test]
 fn what_cannot_be_written_ends_the_work() {
     let place = tempfile::tempdir().unwrap();

@@ -80,7 +80,7 @@ fn encountered_maximum_is_low() {
         .with_iterations(10_000)
         .with_largest(LargestArea::Encountered);
     let met = SectionLaw::monte_carlo(&cube, &options).unwrap().max_area();
-    // Low by 1 to 3 %, as docs/kmatrix.md tells.
+    // Low by 1 to 3 %, as documented in docs/kmatrix.md.
     let low = 1.0 - met / 2.0_f64.sqrt();
     assert!((0.01..0.03).contains(&low), "{low}");
 }

@@ -31,8 +31,8 @@ pub fn draw(folder: &Path) -> Result<()> {
     let views = flakes();
     let three = views.each_ref().map(samples);
     let exemplars = three.each_ref().map(|view| Exemplar::new(view.view()));
-    let told = |done: f64, _: &TextureReport| go(done);
-    let (volume, _) = synthesize_oriented_volume(&exemplars, [96; 3], &TextureOptions::default(), &told)?;
+    let watch = |done: f64, _: &TextureReport| go(done);
+    let (volume, _) = synthesize_oriented_volume(&exemplars, [96; 3], &TextureOptions::default(), &watch)?;
     let pictures = beside(&beside(&views[0], &views[1]), &views[2]);
     beside(&pictures, &picture_of(&volume)?).save(folder.join("texture-layers-oriented.png"))?;
     Ok(())

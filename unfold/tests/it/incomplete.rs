@@ -170,7 +170,7 @@ fn scale_comes_from_the_likelihood() {
     ));
 }
 
-/// Types whose profiles are very different are told apart; types whose profiles are alike are not, and that is said.
+/// Types whose profiles are very different are distinguished; types whose profiles are alike are not, and that is said.
 #[test]
 fn unknown_fractions_are_found_or_refused() {
     let edges = equal_edges(1.0, 5);

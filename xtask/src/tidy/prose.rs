@@ -26,32 +26,30 @@ const AVOIDED: [(&str, &str); 10] = [
     ("gone on with", "resumed"),
 ];
 
-/// Comment lines that are too wide. Tables and single words without a space cannot be broken and pass.
+/// Comment lines that are too wide. Tables, fenced blocks and single words without a space cannot be broken and pass.
 pub fn narrow_comments(path: &Path, text: &str) -> Vec<Finding> {
     let in_strings = lines_inside_strings(text);
-    let is_breakable = |comment: &str| {
+    let mut fenced = false;
+    let mut findings = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let Some(comment) = line.trim_start().strip_prefix("//") else {
+            fenced = false;
+            continue;
+        };
         let words = comment.trim_start_matches(['/', '!']).trim();
-        !words.starts_with('|') && words.contains(' ')
-    };
-    text.lines()
-        .enumerate()
-        .filter(|(index, line)| {
-            let comment = line.trim_start();
-            comment.starts_with("//")
-                && line.chars().count() > WIDEST_COMMENT
-                && is_breakable(comment)
-                && !in_strings.contains(&(index + 1))
-        })
-        .map(|(index, line)| {
-            Finding::error(
+        if words.starts_with("```") {
+            fenced = !fenced;
+        }
+        let width = line.chars().count();
+        let is_breakable = !fenced && !words.starts_with('|') && words.contains(' ');
+        if width > WIDEST_COMMENT && is_breakable && !in_strings.contains(&(index + 1)) {
+            findings.push(Finding::error(
                 format!("{}:{}", path.display(), index + 1),
-                format!(
-                    "a comment of {} columns; break it at {WIDEST_COMMENT}",
-                    line.chars().count()
-                ),
-            )
-        })
-        .collect()
+                format!("a comment of {width} columns; break it at {WIDEST_COMMENT}"),
+            ));
+        }
+    }
+    findings
 }
 
 /// Lines that a string begun on an earlier line goes on in.

@@ -71,8 +71,7 @@ pub fn run() -> Result<()> {
         } else if path.file_name().is_some_and(|name| name == "Cargo.toml") {
             findings.extend(dependencies::lints_are_on(path, &read(path)?));
         } else if path.extension().is_some_and(|extension| extension == "md") {
-            let words = prose::plain_words(path, &read(path)?);
-            findings.extend(words.into_iter().map(Finding::into_warning));
+            findings.extend(prose::plain_words(path, &read(path)?));
         }
     }
     sources.retain(|(path, _)| path.iter().nth(1).is_some_and(|part| part == "src"));
@@ -80,8 +79,6 @@ pub fn run() -> Result<()> {
     findings.extend(crates(&sources).iter().flat_map(|folder| {
         let read = |path: &Path| fs::read_to_string(root.join(folder).join(path)).ok();
         import_circles::import_circles(folder, &read)
-            .into_iter()
-            .map(Finding::into_warning)
     }));
 
     // The program is built only if everything else is in order.
@@ -117,7 +114,7 @@ fn source(path: &Path, text: &str) -> Vec<Finding> {
             words.extend(prose::names_no_options(path, text));
         }
     }
-    findings.extend(words.into_iter().map(Finding::into_warning));
+    findings.extend(words);
     findings
 }
 

@@ -1,4 +1,4 @@
-//! The surfaces of packed particles for ParaView: VTP with every body's faces where they lie.
+//! The surfaces of packed particles for ParaView: a VTP file with the faces of every particle in place.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,10 +9,10 @@ use stereology::shape::{BodyKind, Particle, TriangleMesh, UnitBody};
 
 use crate::failure::{Explain, Failure};
 
-/// Above this many particles balls and ellipsoids get 80 faces, else 320.
+/// Above this number of particles, spheres and ellipsoids have 80 faces instead of 320.
 const MANY: usize = 5000;
 
-/// Refuses a name that says another format.
+/// Refuses a file name with another extension.
 pub fn check_ending(path: &Path) -> Result<(), Failure> {
     if path.extension().is_some_and(|ending| ending == "vtp") {
         Ok(())
@@ -24,14 +24,14 @@ pub fn check_ending(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the faces of all particles, each whole where its centre is in the box; every face knows its particle, size,
-/// shape and category.
+/// Writes the faces of all particles. Particles are not cut at the box: each is whole, with its centre in the box.
+/// Every face has the number, size, shape and category of its particle.
 pub fn write(path: &Path, bodies: &[UnitBody], particles: &[Particle]) -> Result<(), Failure> {
     let outlines: Vec<TriangleMesh> = bodies.iter().map(|body| outline(body, particles.len())).collect();
     let faces: usize = particles.iter().map(|p| outlines[p.shape].triangles.len()).sum();
     if faces > i32::MAX as usize / 3 {
         return Err(Failure::run(format!(
-            "--surfaces {}: {faces} faces are more than the format counts; pack fewer particles or simpler meshes",
+            "--surfaces {}: {faces} faces are too many for the format; pack fewer particles or simpler meshes",
             path.display()
         )));
     }
@@ -155,7 +155,7 @@ mod tests {
     use nalgebra::{Point3, UnitQuaternion};
     use stereology::shape::{Body, Particle, UnitBody};
 
-    /// The bytes announced are those that follow: header, then 8 bytes of length and the data of each array.
+    /// The file has the layout that its header declares: header, then 8 bytes of length and the data of each array.
     #[test]
     fn arrays_are_where_the_header_says() {
         let bodies = [Body::cuboid([1.0; 3]).unwrap(), Body::sphere(1.0).unwrap()].map(|body| UnitBody::new(&body));

@@ -102,7 +102,7 @@ impl Command {
             Self::Displace(options) => options.run(everywhere).map(Some),
             Self::Explore(options) => options.run(everywhere).map(Some),
             Self::Schema(options) => options.run(everywhere).map(|()| None),
-            // The page is made from this file's definitions, so that `main` prints it.
+            // The page is generated from the definitions in this file, so `main` prints it.
             Self::Manual => Ok(None),
         }
     }

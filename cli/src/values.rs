@@ -1,5 +1,5 @@
-//! Values of options: positive numbers, lists, colours, shapes with their fractions. The message for a wrong value says
-//! what is allowed.
+//! Values of options: positive numbers, lists, colours, shapes with their fractions. The message for an invalid
+//! value states what is allowed.
 
 use std::str::FromStr;
 
@@ -72,7 +72,7 @@ pub enum MaxSize {
     Profile,
     /// The size of the largest profile, corrected for its bias.
     Corrected,
-    /// The size of greatest likelihood.
+    /// The maximum-likelihood size.
     Likelihood,
 }
 
@@ -96,7 +96,7 @@ impl FromStr for MaxSize {
 pub enum CappingAngle {
     /// A known angle.
     Degrees(f64),
-    /// The angle of greatest likelihood.
+    /// The maximum-likelihood angle.
     Fit,
 }
 

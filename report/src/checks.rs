@@ -53,7 +53,7 @@ pub(crate) fn sentence(verdict: &Verdict) -> String {
             verdict.checks.len()
         ),
         Level::Bad => format!(
-            "Do not rely on this result yet: {} of {} failed. The list below says what to do.",
+            "Do not rely on this result yet: {} of {} failed. The list below states what to do.",
             checks(count(Level::Bad)),
             verdict.checks.len()
         ),
@@ -185,37 +185,37 @@ fn should_be(check: &Check) -> String {
 fn meaning(name: CheckName) -> &'static str {
     match name {
         CheckName::Outlines => {
-            "Everything follows from the outlines. Look at the overlay: is each particle outlined once, and nothing else? If not, set the binder's colour or import a label map."
+            "All results depend on the outlines. Look at the overlay: is each particle outlined once, and nothing else? If not, set the binder's colour or import a label map."
         }
         CheckName::ProfilesCounted => {
-            "The relative error of any count is at least one over its square root; the bins of large and of small particles hold the fewest profiles. A photograph of a larger area helps, fewer bins too."
+            "The relative error of any count is at least one over its square root; the bins of large and of small particles have the fewest profiles. A photograph of a larger area helps, and so do fewer bins."
         }
         CheckName::GoodnessOfFit => {
-            "The fitted particles, sectioned again, must show the observed profile histogram. If they do not, the shape is wrong, or profiles are merged or broken."
+            "Sections of the fitted particles must give the observed profile histogram. If they do not, the shape is wrong, or profiles are merged or split."
         }
         CheckName::VolumeFraction => {
-            "On average they are equal (Delesse), whatever the shapes. A difference shows a wrong shape, or small profiles that were missed. The packing uses the fraction of the photograph."
+            "On average they are equal (Delesse) for all shapes. A difference indicates a wrong shape, or small profiles that were missed. The packing uses the fraction of the photograph."
         }
         CheckName::Overlap => {
-            "Overlapping particles would make the sections wrong in size and number. A separate pass proves for every pair of neighbours that they do not."
+            "Overlapping particles would give sections of wrong size and number. A separate pass proves for every pair of neighbours that they do not overlap."
         }
         CheckName::SectionAreaFraction => {
             "The fraction of particles on sections of the solid, measured exactly at many depths."
         }
         CheckName::SectionSizes => {
-            "How far the sizes would have to move, on average, to become those of the photograph (Wasserstein-1). If far: too few bins, a wrong shape, or sizes left out."
+            "Mean change of size that would turn the sizes on sections into those of the photograph (Wasserstein-1 distance). If it is large: too few bins, a wrong shape, or sizes left out."
         }
         CheckName::SectionColours => {
-            "How far the mean colours of profiles and binder would have to move to become those of the photograph. If far: colours missing among the categories, or a wrong area fraction."
+            "Mean change that would turn the mean colours of profiles and binder into those of the photograph. If it is large: colours missing among the categories, or a wrong area fraction."
         }
         CheckName::TotalInterval => {
-            "How well the counts determine the particles per volume, small ones above all. For a narrower interval use fewer bins, a larger --min-size, or photographs of a larger area."
+            "How well the counts determine the particles per volume, especially the small ones. For a narrower interval use fewer bins, a larger --min-size, or photographs of a larger area."
         }
         CheckName::ResegmentedSizes | CheckName::ResegmentedAreaFraction => {
-            "Images of the solid's sections, segmented like the photograph: the only checks that show a bias of the segmentation itself."
+            "Images of the solid's sections, segmented like the photograph: these are the only checks that reveal a bias of the segmentation itself."
         }
         CheckName::Texture => {
-            "Power of the residual texture by spatial frequency, photograph against sections (root mean square, weighted by power). If they differ much, the texture has structures that this synthesis cannot make, or too little of the photograph lies away from outlines to learn it."
+            "Power of the residual texture by spatial frequency, photograph compared with sections (root mean square, weighted by power). If they differ much, the texture has structures that this synthesis cannot reproduce, or too little of the photograph is away from outlines to measure it."
         }
     }
 }

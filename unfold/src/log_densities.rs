@@ -1,18 +1,18 @@
-//! Fisher scoring for logarithms of densities: the likelihood of the counts, less a penalty on their roughness.
+//! Fisher scoring for log-densities: maximises the likelihood of the counts minus a penalty on roughness.
 
 use crate::cholesky::{Symmetric, dot, products};
 use nalgebra::DMatrix;
 
-/// Expected counts of one particle per unit volume in each node, column by column, with the rows each column touches.
+/// Expected counts for one particle per unit volume at each node: one column per node, with its range of nonzero rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Design {
     rows: usize,
     entries: Vec<f64>,
-    /// Rows of each column that are not zero: from, to.
+    /// Range of nonzero rows of each column: start, end (exclusive).
     spans: Vec<(usize, usize)>,
-    /// The columns again, four side by side, the last filled up with zeros.
+    /// The same columns, interleaved in groups of four; the last group is padded with zeros.
     fours: Vec<[f64; 4]>,
-    /// Rows of each four that are not zero.
+    /// Range of nonzero rows of each group of four.
     four_spans: Vec<(usize, usize)>,
 }
 
@@ -57,7 +57,7 @@ impl Design {
         (from, &self.entries[node * self.rows + from..node * self.rows + to])
     }
 
-    /// Expected counts of a particle of each node.
+    /// Expected number of profiles for one particle per unit volume at this node.
     pub(crate) fn column_sum(&self, node: usize) -> f64 {
         self.column(node).1.iter().sum()
     }
@@ -80,22 +80,22 @@ pub(crate) fn log_likelihood(counts: &[f64], expected: &[f64]) -> f64 {
     counts.iter().zip(expected).map(term).sum()
 }
 
-/// Weight × the sum of squared differences of an order.
+/// A roughness penalty: weight × sum of squared differences of the given order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Penalty {
     pub(crate) order: usize,
     pub(crate) weight: f64,
-    /// Place about which the penalty is lighter, as a fraction of the nodes.
+    /// Centre of the region with a weaker penalty, as a fraction of the range of nodes.
     pub(crate) bend: Option<f64>,
 }
 
-/// At a bend the weight is 10³ times less.
+/// Decimal logarithm of the factor by which the weight is smaller at a bend.
 const BEND_DEPTH: f64 = 3.0;
-/// And returns to what it is elsewhere as a Gaussian with this standard deviation, a share of the nodes.
+/// Standard deviation of the Gaussian by which the weight returns to its value elsewhere, as a fraction of the nodes.
 const BEND_WIDTH: f64 = 0.12;
 
 impl Penalty {
-    /// Nothing is penalised.
+    /// No penalty.
     pub(crate) const NONE: Self = Self {
         order: 0,
         weight: 0.0,
@@ -114,7 +114,7 @@ impl Penalty {
         })
     }
 
-    /// The penalty of so many nodes.
+    /// The penalty on this many nodes.
     pub(crate) fn on(self, nodes: usize) -> Roughness {
         let weight = |difference: usize| {
             let Some(bend) = self.bend else { return self.weight };
@@ -148,7 +148,7 @@ impl Penalty {
     }
 }
 
-/// A penalty on the nodes of a fit: the weight of every difference.
+/// A penalty on the nodes of a fit, with the weight of every difference.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Roughness {
     stencil: Vec<f64>,
@@ -166,7 +166,7 @@ impl Roughness {
         differences.map(half).sum()
     }
 
-    /// Takes the slope of half the penalty off `slope`.
+    /// Subtracts the gradient of half the penalty from `slope`.
     fn take_off(&self, theta: &[f64], slope: &mut [f64]) {
         for (start, (part, weight)) in theta.windows(self.stencil.len()).zip(&self.weights).enumerate() {
             let difference: f64 = part.iter().zip(&self.stencil).map(|(t, w)| t * w).sum();
@@ -176,7 +176,7 @@ impl Roughness {
         }
     }
 
-    /// Adds the penalty's matrix.
+    /// Adds the matrix of the penalty.
     pub(crate) fn add_to(&self, matrix: &mut Symmetric) {
         for (start, weight) in self.weights.iter().enumerate() {
             for (a, wa) in self.stencil.iter().enumerate() {
@@ -193,12 +193,12 @@ impl Roughness {
     }
 }
 
-/// What scoring works on, kept between fits.
+/// Buffers of the scoring, reused between fits.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     expected: Vec<f64>,
     densities: Vec<f64>,
-    /// diag(1 / √μ) K diag(n), four columns side by side.
+    /// diag(1 / √μ) K diag(exp θ), columns interleaved in groups of four.
     scaled: Vec<[f64; 4]>,
     /// 1 / √μ and n / μ − 1.
     roots: Vec<(f64, f64)>,
@@ -222,31 +222,31 @@ impl Workspace {
 pub(crate) struct Peak {
     /// ln of the density of each node.
     pub(crate) theta: Vec<f64>,
-    /// Log-likelihood there.
+    /// Log-likelihood at the maximum.
     pub(crate) likelihood: f64,
-    /// Log-likelihood less half the penalty.
+    /// Log-likelihood minus half the penalty.
     pub(crate) value: f64,
     /// ln of the determinant of the information with the penalty.
     pub(crate) log_determinant: f64,
-    /// Steps.
+    /// Number of steps.
     pub(crate) iterations: usize,
-    /// Whether the last step promised less gain than required.
+    /// Whether the predicted gain of the last step was below the limit.
     pub(crate) converged: bool,
 }
 
-/// Keeps logarithms of densities that no count and no neighbour holds from running away: a standard deviation of 10³.
+/// Ridge that keeps log-densities finite where neither counts nor neighbours constrain them: standard deviation 10³.
 const RIDGE: f64 = 1e-6;
-/// No logarithm moves farther than this in a step.
+/// Largest change of a log-density in one step.
 const LONGEST_STEP: f64 = 12.0;
 
-/// Where a climb begins, and what is known there whatever the penalty: fits that begin at one place share it.
+/// Starting point of a fit, with the quantities that do not depend on the penalty; fits from the same point reuse it.
 #[derive(Clone, Debug)]
 pub(crate) struct Start {
     theta: Vec<f64>,
     likelihood: f64,
-    /// Of the likelihood.
+    /// Gradient of the log-likelihood.
     slope: Vec<f64>,
-    /// Without a penalty.
+    /// Fisher information without the penalty.
     information: Symmetric,
 }
 
@@ -291,7 +291,7 @@ pub(crate) fn climb(
     let (mut iterations, mut log_determinant, mut converged) = (0, 0.0, false);
     while iterations < effort.most_steps && !converged {
         if iterations > 0 {
-            // Densities and expected counts of the last trial, which is where θ is, are in the room.
+            // `room` holds the densities and expected counts of the last trial, which is the current θ.
             score(design, counts, &mut slope, room);
         }
         iterations += 1;
@@ -321,12 +321,12 @@ pub(crate) fn climb(
             risen
         });
         if !risen {
-            // Rounding: nothing is higher than this.
+            // No step increases the value beyond rounding errors: this is the maximum.
             converged = true;
             break;
         }
         theta.copy_from_slice(&trial);
-        // What is left is half of what the step promised at most.
+        // The remaining gain is at most half of the gain that this step predicted.
         if value + gain - 0.5 * log_determinant < effort.hopeless {
             break;
         }
@@ -341,45 +341,45 @@ pub(crate) fn climb(
     }
 }
 
-/// How far to climb.
+/// Stopping criteria of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// A step that promises less gain of the log-likelihood than this is the last; scoring converges quadratically, so
-    /// what is left is far less.
+    /// The first step with a predicted gain of the log-likelihood below this is the last. Scoring converges
+    /// quadratically, so the remaining gain is far smaller.
     last_gain: f64,
     most_steps: usize,
-    /// A climb is given up where its value less half the logarithm of the determinant cannot come up to this.
+    /// A fit is abandoned if its value minus half the log-determinant cannot reach this.
     hopeless: f64,
 }
 
 impl Effort {
-    /// To the top.
+    /// Iterate to the maximum.
     pub(crate) const FULL: Self = Self {
         last_gain: 0.1,
         most_steps: 60,
         hopeless: f64::NEG_INFINITY,
     };
-    /// As near as evidence and refits need: densities that run towards zero are left on their way.
+    /// Accurate enough for evidence and refits: densities that tend to zero need not converge.
     pub(crate) const BRIEF: Self = Self {
         last_gain: 1.0,
         most_steps: 8,
         hopeless: f64::NEG_INFINITY,
     };
-    /// One step, for the information at the start.
+    /// One step, to obtain the information at the starting point.
     pub(crate) const STEP: Self = Self {
         last_gain: f64::INFINITY,
         most_steps: 1,
         hopeless: f64::NEG_INFINITY,
     };
 
-    /// Given up where it cannot come up to `hopeless`.
+    /// The same criteria, but the fit is abandoned if it cannot reach `hopeless`.
     pub(crate) const fn unless_below(mut self, hopeless: f64) -> Self {
         self.hopeless = hopeless;
         self
     }
 }
 
-/// Log-likelihood at θ, with densities and expected counts left in `room`.
+/// Log-likelihood at θ; stores the densities and expected counts in `room`.
 fn ascend(design: &Design, counts: &[f64], theta: &[f64], room: &mut Workspace) -> f64 {
     for (density, t) in room.densities.iter_mut().zip(theta) {
         *density = t.exp();
@@ -388,7 +388,8 @@ fn ascend(design: &Design, counts: &[f64], theta: &[f64], room: &mut Workspace) 
     log_likelihood(counts, &room.expected)
 }
 
-/// Slope of the likelihood into `slope`, information into `room`, where its densities and expected counts are.
+/// Writes the gradient of the log-likelihood into `slope` and the information into `room`, from the densities and
+/// expected counts in `room`.
 fn score(design: &Design, counts: &[f64], slope: &mut [f64], room: &mut Workspace) {
     let Workspace {
         expected,
@@ -398,7 +399,7 @@ fn score(design: &Design, counts: &[f64], slope: &mut [f64], room: &mut Workspac
         information,
     } = room;
     let (rows, nodes) = (design.rows, design.nodes());
-    // 1/√μ for the information, n/μ − 1 for the slope.
+    // 1/√μ for the information, n/μ − 1 for the gradient.
     for ((root, &mu), &n) in roots.iter_mut().zip(&*expected).zip(counts) {
         *root = if mu > 0.0 {
             (1.0 / mu.sqrt(), n / mu - 1.0)

@@ -1,64 +1,63 @@
-//! The smooth estimate: logarithms of densities with a penalty on their roughness, how heavy is for the counts to say.
+//! The smooth estimate: log-densities with a roughness penalty whose weight is determined by the counts.
 //!
-//! The penalty of order r, λ/2 Σ (Δʳ θ)², is the logarithm of a Gaussian prior of θ; the evidence of λ and r is the
-//! integral of likelihood times prior over θ, by Laplace's approximation
+//! The penalty of order r, λ/2 Σ (Δʳ θ)², is minus the logarithm of a Gaussian prior of θ. The evidence of λ and r is
+//! the integral of likelihood times prior over θ, by Laplace's approximation:
 //!
 //! ```text
 //! ln p(n | λ, r) ≈ ℓ(θ̂) − λ/2 |Dθ̂|² + (m − r)/2 ln λ + ½ ln |DDᵀ| − ½ ln |I + λ DᵀD| − r ln(σ √m)
 //! ```
 //!
-//! where the last term is the price of the r directions the penalty leaves free, polynomials below degree r, each with
-//! a standard deviation of σ = 1 a node. Fits along λ = 10^k and at half decades about the best, for r = 1, 2, 3: the
-//! logarithms of their densities are averaged with the evidence as weights (empirical Bayes with nothing chosen by
-//! hand).
+//! The last term is the cost of the r directions that the penalty leaves free (polynomials below degree r), each with
+//! a standard deviation of σ = 1 per node. Fits are made for r = 1, 2, 3 at λ = 10^k, and at half decades around the
+//! best. Their log-densities are averaged with the evidence as weights (empirical Bayes without a manual choice).
 //!
-//! No density need be equally smooth everywhere: where one population of particles gives way to another, ln(e^a + e^b)
-//! bends within a few nodes, and where the smallest begin it falls away. A penalty light enough for the bend leaves
-//! noise elsewhere, one heavy enough elsewhere fills the valley. So penalties of order 3 that give way at one place,
-//! and are heavier elsewhere, are tried too, at places evenly spread, and averaged with the others: an evidence each,
-//! as those. On 80 to 200 samples this took .008 to .012 from the L1 distance of the bimodal distribution of figure 7
-//! and .015 from the lognormal one, and left the single mode as it was; widths of .08 to .15, depths of 10³ and 10⁴,
-//! and five or nine places were alike.
+//! A log-density need not be equally smooth everywhere. Where one population of particles gives way to another,
+//! ln(e^a + e^b) bends within a few nodes, and at the smallest sizes of a population it drops steeply. A penalty weak
+//! enough for the bend leaves noise elsewhere; one strong enough elsewhere fills the valley between the modes.
+//! Therefore penalties of order 3 that are weaker at one place, and stronger elsewhere, are also fitted, at evenly
+//! spaced places, and averaged with the others by their evidence. On 80 to 200 samples this reduced the L1 distance
+//! by .008 to .012 for the bimodal distribution of figure 7 and by .015 for the lognormal one, and did not change it
+//! for the single mode. Widths of .08 to .15, depths of 10³ and 10⁴, and five or nine places gave similar results.
 
 use crate::log_densities::{Design, Effort, Peak, Penalty, Start, Workspace, climb};
 
-/// Spread of the logarithm of densities along the polynomials a penalty leaves free.
+/// Standard deviation σ of the log-densities along the polynomials that a penalty leaves free.
 const FREE_SPREAD: f64 = 1.0;
-/// log of the heaviest weight, per order, for [`REFERENCE_NODES`] nodes: practically a polynomial.
+/// Decimal logarithm of the largest weight, by order, for [`REFERENCE_NODES`] nodes; its fit is almost a polynomial.
 const HEAVIEST: [f64; 3] = [5.0, 6.0, 7.0];
 const REFERENCE_NODES: f64 = 40.0;
-/// The first weight is so many times lighter.
+/// The first weight is smaller than the largest by this factor.
 const FIRST: f64 = 1e4;
-/// Weights rise and fall by this factor.
+/// Ratio of consecutive weights.
 const DECADE: f64 = 10.0;
 const MOST_WEIGHTS: usize = 12;
-/// The path ends where the evidence is lower than the best by this: 1/400 of its weight in the mean.
+/// The search ends where ln of the evidence is this far below the best: 1/400 of its weight in the average.
 const ENOUGH: f64 = 6.0;
 
-/// Places of a bend that are tried, evenly spread over the nodes.
+/// Number of places of a bend that are tried, evenly spaced over the nodes.
 const BENDS: usize = 5;
-/// Penalties with a bend are so many times heavier elsewhere than the best without.
+/// Factors by which penalties with a bend are stronger elsewhere than the best penalty without.
 const HEAVIER: [f64; 2] = [10.0, 100.0];
-/// On fewer nodes than this nothing can bend.
+/// With fewer nodes than this no bend is tried.
 const LEAST_NODES_TO_BEND: usize = 16;
 
 /// The fits of all orders and weights that were tried, and their mean.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SmoothFit {
-    /// Densities of the nodes: their logarithms averaged by evidence.
+    /// Densities at the nodes: exponentials of the log-densities averaged by evidence.
     pub(crate) densities: Vec<f64>,
     /// ln of the evidence, averaged over the weights tried.
     pub(crate) evidence: f64,
     /// The single best penalty.
     pub(crate) penalty: Penalty,
-    /// The best weight at order 2, where intervals are drawn, and the fit there.
+    /// The best penalty of order 2, from which intervals are computed, and its fit.
     pub(crate) second_order: (Penalty, Vec<f64>),
-    /// Trace of information over information with penalty, at the best: parameters in effect.
+    /// Effective number of parameters: trace of (information with penalty)⁻¹ × information, at the best penalty.
     pub(crate) effective_parameters: f64,
     pub(crate) iterations: usize,
 }
 
-/// Fits of one order and weight.
+/// The fit of one order and weight.
 struct Step {
     penalty: Penalty,
     peak: Peak,
@@ -105,13 +104,13 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
     }
 }
 
-/// Fits from a middling weight up and down, each from where the last one ended, until the evidence is lost; then at
-/// half steps about the best; then with bends.
+/// Fits with increasing and decreasing weights from a medium one, each started at the previous fit, until the evidence
+/// is too low; then at half steps around the best; then with bends.
 fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> Vec<Step> {
     let nodes = design.nodes();
     let constant =
         0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (FREE_SPREAD * (nodes as f64).sqrt()).ln();
-    // The same roughness in finer nodes: differences of order r shrink with r powers of the spacing.
+    // The same roughness on finer nodes: differences of order r are proportional to the spacing to the power r.
     let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
     let mut best_yet = f64::NEG_INFINITY;
     let mut step = |weight: f64, bend: Option<f64>, start: &Start, room: &mut Workspace| {
@@ -169,7 +168,7 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
     steps
 }
 
-/// The density at which all nodes alike would show as many profiles as there are.
+/// The density that, equal at all nodes, gives the observed number of profiles.
 pub(crate) fn level(design: &Design, counts: &[f64]) -> f64 {
     let shown: f64 = (0..design.nodes()).map(|node| design.column_sum(node)).sum();
     counts.iter().sum::<f64>() / shown
@@ -178,7 +177,7 @@ pub(crate) fn level(design: &Design, counts: &[f64]) -> f64 {
 /// tr (I + λP)⁻¹ I.
 fn effective_parameters(design: &Design, counts: &[f64], penalty: Penalty, theta: &[f64], room: &mut Workspace) -> f64 {
     let nodes = design.nodes();
-    // One more step leaves the factor of I + λP at θ in the workspace; I itself is that less λP.
+    // One more step leaves the factor of I + λP at θ in the workspace; I is that minus λP.
     let roughness = penalty.on(nodes);
     let start = Start::at(design, counts, theta, room);
     let _ = climb(design, counts, &roughness, &start, Effort::STEP, room);

@@ -2,7 +2,7 @@
 
 use stereology_metrics::{EdgesError, check_edges};
 
-/// Slices numbered beyond this are numbered anew.
+/// Slices with numbers above this are renumbered.
 const MOST_SLICES: usize = 1_000_000;
 
 /// Profiles counted in bins (a, b] of their size, on a known area.
@@ -27,7 +27,7 @@ pub struct ProfileCounts {
     area: f64,
     profiles: usize,
     dispersion: f64,
-    /// Σ π d² / 4 by bin.
+    /// Σ π d² / 4 for each bin.
     areas: Vec<f64>,
     /// Counts of each slice.
     slices: Option<Vec<Vec<f64>>>,
@@ -37,7 +37,7 @@ pub struct ProfileCounts {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProfilesError {
-    /// Nothing to count.
+    /// There are no profiles.
     #[error(
         "no profiles: unfolding needs at least one (give the profiles of the examined area, or lower the threshold)"
     )]
@@ -48,7 +48,7 @@ pub enum ProfilesError {
     /// A size that is not a positive length.
     #[error("profile {index} has size {size}: sizes must be positive and finite")]
     Size {
-        /// Which, from 0.
+        /// Index of the profile, from 0.
         index: usize,
         /// Its size.
         size: f64,
@@ -56,13 +56,13 @@ pub enum ProfilesError {
     /// A weight that is negative or not finite.
     #[error("profile {index} has weight {weight}: weights must be finite and not negative")]
     Weight {
-        /// Which, from 0.
+        /// Index of the profile, from 0.
         index: usize,
         /// Its weight.
         weight: f64,
     },
     /// Weights and sizes differ in number.
-    #[error("{weights} weights for {sizes} sizes: give one weight a profile")]
+    #[error("{weights} weights for {sizes} sizes: give one weight per profile")]
     WeightCount {
         /// Number of weights.
         weights: usize,
@@ -82,24 +82,24 @@ pub enum ProfilesError {
         "{count} profiles are larger than the largest size {largest} (the largest is {size}, profile {index}): raise the maximum size"
     )]
     TooLarge {
-        /// How many.
+        /// Their number.
         count: usize,
         /// The last edge.
         largest: f64,
-        /// The largest of them.
+        /// Size of the largest of them.
         size: f64,
-        /// Which it is, from 0.
+        /// Index of the largest of them, from 0.
         index: usize,
     },
     /// A count that is negative or not finite, or counts and bins that differ in number.
-    #[error("{counts} counts for {bins} bins: give one count a bin, finite and not negative")]
+    #[error("{counts} counts for {bins} bins: give one count per bin, finite and not negative")]
     Counts {
         /// Number of counts.
         counts: usize,
         /// Number of bins.
         bins: usize,
     },
-    /// Edges that make no bins.
+    /// The edges do not define bins.
     #[error(transparent)]
     Edges(#[from] EdgesError),
 }
@@ -107,13 +107,14 @@ pub enum ProfilesError {
 impl ProfileCounts {
     /// Counts profile sizes (diameters of the circles of their areas) in the bins between `edges`, on `area`.
     ///
-    /// `weights`, one a profile, multiply its count: Miles-Lantuejoul weights of edge correction, or 0 outside a
-    /// counting frame. Profiles not larger than the first edge are not counted. Takes `sizes` × log(`edges`) steps.
+    /// `weights`, one per profile, multiply the count of each profile: Miles-Lantuejoul weights of an edge correction,
+    /// or 0 outside a counting frame. Profiles not larger than the first edge are not counted. Complexity: O(`sizes` ×
+    /// log `edges`).
     ///
     /// # Errors
     ///
-    /// [`ProfilesError`]: no profiles, sizes or weights that are no such thing, sizes beyond the last edge, a bad area
-    /// or bad edges.
+    /// [`ProfilesError`]: no profiles, invalid sizes or weights, sizes beyond the last edge, an invalid area or invalid
+    /// edges.
     pub fn from_sizes(sizes: &[f64], weights: Option<&[f64]>, edges: &[f64], area: f64) -> Result<Self, ProfilesError> {
         check_edges(edges)?;
         check_area(area)?;
@@ -181,11 +182,11 @@ impl ProfileCounts {
         })
     }
 
-    /// [`from_sizes`](Self::from_sizes) with the slice each profile is on, so that slices can be drawn again
+    /// [`from_sizes`](Self::from_sizes) with the slice of each profile, so that slices can be resampled
     /// ([`Resampling::Slices`](crate::Resampling)).
     ///
-    /// `area` is that of all slices together; slices are taken to be equally large, and one without profiles is only
-    /// known of if its number lies between others': numbers run from 0 to the largest.
+    /// `area` is that of all slices together, and all slices are assumed to have the same area. Slices are numbered
+    /// from 0 to the largest number that occurs, so a slice without profiles counts only if its number is below that.
     ///
     /// # Errors
     ///
@@ -211,7 +212,7 @@ impl ProfileCounts {
                 sizes: sizes.len(),
             });
         }
-        // Numbers need not be dense: slices that hold nothing at all beyond a million are not counted one by one.
+        // Numbers need not be consecutive: beyond a million, slices without profiles are not allocated.
         let most = slices.iter().max().map_or(0, |&last| last);
         let numbers: Option<Vec<usize>> = (most >= MOST_SLICES).then(|| {
             let mut numbers = slices.to_vec();
@@ -235,12 +236,14 @@ impl ProfileCounts {
         Ok(whole)
     }
 
-    /// Counts that are known by bin, whole numbers or expectations.
+    /// Known counts of each bin, whole numbers or expectations.
     ///
     /// # Errors
     ///
-    /// [`ProfilesError`]: counts that are negative, not finite or not one a bin; all zero; a bad area or bad edges.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A count of profiles is far below 2^53 and not negative.
+    /// [`ProfilesError`]: counts that are negative, not finite, not one per bin, or all zero; an invalid area or
+    /// invalid edges.
+    // A count of profiles is far below 2^53 and not negative.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn from_counts(counts: &[f64], edges: &[f64], area: f64) -> Result<Self, ProfilesError> {
         check_edges(edges)?;
         check_area(area)?;
@@ -270,38 +273,39 @@ impl ProfileCounts {
         })
     }
 
-    /// The edges, one more than bins.
+    /// The edges of the bins, one more than there are bins.
     #[must_use]
     pub fn edges(&self) -> &[f64] {
         &self.edges
     }
 
-    /// Sum of weights by bin: without weights, the number of profiles.
+    /// Sum of weights in each bin; without weights, the number of profiles.
     #[must_use]
     pub fn counts(&self) -> &[f64] {
         &self.counts
     }
 
-    /// Profiles per unit area by bin, N_A.
+    /// Profiles per unit area in each bin, N_A.
     #[must_use]
     pub fn per_area(&self) -> Vec<f64> {
         self.counts.iter().map(|count| count / self.area).collect()
     }
 
-    /// Share of the area in profiles by bin; A_A is their sum. From counts, with sizes spread over each bin.
+    /// Fraction of the area inside the profiles of each bin; their sum is A_A. Computed from sizes; for known counts,
+    /// sizes are assumed to be uniformly distributed over each bin.
     #[must_use]
     pub fn area_fractions(&self) -> Vec<f64> {
         self.areas.iter().map(|area| area / self.area).collect()
     }
 
-    /// How many slices there are, if profiles came with theirs.
+    /// Number of slices, if the slice of each profile is known.
     #[must_use]
     pub fn slices(&self) -> Option<usize> {
         self.slices.as_ref().map(Vec::len)
     }
 
-    /// At least so many slices, those beyond the recorded ones without profiles: for a part of the profiles that has
-    /// none on the last slices.
+    /// Increases the number of slices to at least this many; the additional slices have no profiles. For a subset of
+    /// the profiles that has none on the last slices.
     ///
     /// ```
     /// use stereology_unfold::ProfileCounts;
@@ -332,20 +336,20 @@ impl ProfileCounts {
         self.area
     }
 
-    /// How many profiles were counted, whatever their weights.
+    /// Number of profiles counted, independent of their weights.
     #[must_use]
     pub fn profiles(&self) -> usize {
         self.profiles
     }
 
-    /// Variance of a weighted count over its mean, Σ w² / Σ w: 1 without weights.
+    /// Variance of a weighted count divided by its mean, Σ w² / Σ w; 1 without weights.
     #[must_use]
     pub fn dispersion(&self) -> f64 {
         self.dispersion
     }
 }
 
-/// Mean area of profiles with sizes spread over a bin.
+/// Mean area of profiles with sizes uniformly distributed over a bin.
 pub(crate) fn mean_profile_area(bin: &[f64]) -> f64 {
     let (a, b) = (bin[0], bin[1]);
     std::f64::consts::PI / 12.0 * (a * a + a * b + b * b)

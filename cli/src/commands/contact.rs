@@ -57,7 +57,7 @@ pub struct Contact {
     pub invert: bool,
     /// Set the fraction of a bin, before all are normalised: bins 0, 1, ... are the positive region, -1, -2, ... the
     /// negative; may be repeated
-    #[arg(long, value_name = "BIN=SHARE", value_parser = edit, allow_hyphen_values = true)]
+    #[arg(long, value_name = "BIN=FRACTION", value_parser = edit, allow_hyphen_values = true)]
     pub edit: Vec<(i64, f64)>,
     /// Distribution of distances in the negative region, without IMAGE
     #[arg(long, value_name = "LAW", requires = "positive_law", conflicts_with = "image")]

@@ -80,7 +80,7 @@ pub struct Displace {
     /// Stretch structures along an axis by a factor
     #[arg(long, value_name = "X,Y,Z,FACTOR", value_parser = stretch, allow_hyphen_values = true)]
     pub stretch: Option<([f64; 3], f64)>,
-    /// Simplify the result to this many triangles, with small ones where the relief is rich
+    /// Simplify the result to this many triangles, smaller where the relief has more detail
     #[arg(long, value_name = "N", value_parser = count)]
     pub triangles: Option<usize>,
     /// Vertex colours, in .glb and .ply

@@ -426,7 +426,7 @@ impl Grow {
         let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let stored = match ending.as_deref() {
             Some("npy" | "nrrd" | "nhdr") => read_volume(path).at(path)?,
-            // A TIFF that holds neither bytes nor colours may hold chemistry; images use more TIFF variants than
+            // A TIFF without bytes or colours may contain chemistry; images use more TIFF variants than
             // volumes.
             Some("tif" | "tiff") => match read_volume(path) {
                 Ok(stored) if stored.samples.dim().3 != 4 => stored,
@@ -485,7 +485,7 @@ pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
             .map(|n| n.trim().parse().ok())
             .collect()
     };
-    // Checks the numbers, and makes every other shape.
+    // Checks the numbers, and creates all other shapes.
     let body: Body = body(spec)?;
     if let Some(mesh) = body.mesh() {
         return Ok(mesh.clone());

@@ -66,15 +66,15 @@ pub enum Method {
     Exact,
     /// 100,000 random sections, as in the paper, with polygonal profiles
     MonteCarlo,
-    /// 100,000 random sections as in the paper: drawn as images, filled by the even-odd rule, and the largest area
-    /// found taken for A_max
+    /// 100,000 random sections as in the paper: rasterised, filled by the even-odd rule, with the largest area found as
+    /// A_max
     Raster,
 }
 
 /// JSON of `stereology kmatrix`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct KmatrixFields {
-    /// The shape as it was given.
+    /// Description of the shape, as on the command line.
     shape: String,
     /// Triangles of the mesh; null for spheres and ellipsoids.
     triangles: Option<usize>,

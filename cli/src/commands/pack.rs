@@ -28,8 +28,8 @@ use stereology_report::{percent, significant};
 
 /// Packs particles of given sizes into a periodic box without overlap
 ///
-/// Sizes come from a table of number densities (`stereology unfold -o`), from a lognormal distribution, are all 1, or
-/// are listed in a table. The number of particles and the fraction of the volume they fill are met exactly. A separate
+/// Sizes follow a table of number densities (`stereology unfold -o`) or a lognormal distribution, are all 1, or are
+/// listed in a table. The number of particles and the fraction of the volume they fill are met exactly. A separate
 /// pass certifies that no particles overlap. A fraction that cannot be reached is an error, which reports the remaining
 /// overlap.
 ///
@@ -57,12 +57,12 @@ pub struct Pack {
     /// Packing algorithm
     #[arg(long, value_enum, default_value_t = Mode::Fast)]
     pub mode: Mode,
-    /// Stand-in for meshes during packing; the certificate is always for the meshes themselves
+    /// Shapes that replace meshes during packing; the certificate always applies to the meshes themselves
     #[arg(long, value_enum, default_value_t = Proxy::Parts)]
     pub proxy: Proxy,
     /// Largest volume by which the convex parts of a non-convex shape can exceed it, as a fraction of its volume, 0.005
     /// to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.1)]
     pub tolerance: f64,
     /// Maximum number of iterations; with --mode sequential, of positions tried for one particle
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count)]
@@ -98,7 +98,7 @@ pub struct Sizes {
     /// Lognormal sizes with median 1 and this standard deviation of the logarithm
     #[arg(long, value_name = "SIGMA", value_parser = positive)]
     pub lognormal: Option<f64>,
-    /// All sizes 1
+    /// All sizes are 1
     #[arg(long)]
     pub constant: bool,
     /// Table with a column `size` and one row per particle (CSV)
@@ -151,7 +151,7 @@ impl Mode {
     }
 }
 
-/// Stand-in for meshes during packing.
+/// Shapes that replace meshes during packing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Proxy {
     /// The meshes themselves, or their convex parts
@@ -177,11 +177,11 @@ struct Shapes {
     bodies: Vec<UnitBody>,
 }
 
-/// What is packed, and into which box.
+/// The particles to pack, and their box.
 struct Population {
     grains: Vec<Grain>,
     period: PeriodicBox,
-    /// What the densities expect in the box, before rounding to whole particles.
+    /// Number of particles expected from the densities in the box, before rounding.
     expected: Option<f64>,
 }
 
@@ -366,7 +366,7 @@ impl Pack {
         if let Some(table) = &self.sizes.sizes {
             if self.count.is_some() {
                 return Err(Failure::usage(
-                    "--count does not go with --sizes: every row of the table is a particle",
+                    "--count cannot be combined with --sizes: every row of the table is a particle",
                 ));
             }
             let mut grains = Vec::new();
@@ -392,7 +392,7 @@ impl Pack {
                 (Some(side), None) => cube(side)?,
                 (Some(_), Some(_)) => {
                     return Err(Failure::usage(
-                        "--box and --fraction together do not go with --sizes: give one",
+                        "--box and --fraction cannot both be combined with --sizes: give one of them",
                     ));
                 }
                 (None, _) => box_for_fraction(bodies, &grains, fraction).or_fail()?,
@@ -415,7 +415,7 @@ impl Pack {
         let period = cube(side)?;
         let count = count_to_fill(bodies, &grains(1000)?, &period, fraction).or_fail()?;
         let mut grains = grains(count)?;
-        // Whole particles fill a given box only nearly; their sizes take up the rest, all by one factor.
+        // A whole number of particles gives only almost the requested fraction: all sizes are scaled by one factor.
         scale_to_fraction(bodies, &mut grains, &period, fraction).or_fail()?;
         Ok(Population::listed(grains, period))
     }

@@ -67,7 +67,7 @@ pub struct SectionFields {
     p_value: f64,
 }
 
-/// Computes the statistics of a packing, with a line for people.
+/// Computes the statistics of a packing, and a line of the summary.
 pub fn quality(packing: &Packing, seed: u64, notes: &mut Notes) -> QualityFields {
     let (particles, period) = (packing.particles(), packing.period());
     let radial = radial_distribution(particles, period, Distance::Contacts, REACH, BINS);
@@ -112,7 +112,7 @@ pub fn trace(packing: &Packing) -> String {
     text
 }
 
-/// A rendering of the particles, coloured by shape and slightly by number.
+/// A rendering of the particles; colours depend on the shape and, slightly, on the number of the particle.
 pub fn picture(packing: &Packing) -> Result<RgbImage, RenderError> {
     const COLOURS: [[f32; 3]; 6] = [
         [0.74, 0.45, 0.30],

@@ -22,8 +22,8 @@ use crate::values::{Triple, count, not_negative, positive};
 
 /// Renders a finished solid: one period as a block, or a mesh carved from it
 ///
-/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is drawn with three faces visible, as
-/// in the paper. The longest side of a mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
+/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is rendered with three faces visible,
+/// as in the paper. The longest side of a mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
 /// another length, and its surface shows the colours of the solid there.
 ///
 /// Light is traced from surface to surface. Images are free of noise at any number of samples; with 8 x 8 per pixel

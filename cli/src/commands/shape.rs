@@ -22,10 +22,10 @@ use stereology_report::significant;
 /// exponents: near 0 a box, 1 an ellipsoid, 2 an octahedron), the convex hull of points `hull:FILE`, or a sphere edited
 /// by its control points (.json), which is how the particles of the paper were modelled.
 ///
-/// The FILE of a hull is a mesh file, whose vertices are taken, or a text file (.csv, .xyz, .txt) with one point per
+/// The FILE of a hull is a mesh file, whose vertices are used, or a text file (.csv, .xyz, .txt) with one point per
 /// row: x, y, z separated by commas, semicolons, tabs or blanks. A header may name the columns x, y, z in any order;
-/// without a header the first three columns are taken. Rows that begin with
-/// # are skipped.
+/// without a header the first three columns are used. Rows that begin
+/// with # are skipped.
 ///
 /// Writing a sphere or an ellipsoid to a .json file gives control points to start from. Every other command accepts the
 /// written file as SHAPE.
@@ -70,7 +70,7 @@ const MOST_TRIANGLES: usize = 20_000_000;
 /// JSON of `stereology shape`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ShapeFields {
-    /// The shape as it was given.
+    /// Description of the shape, as on the command line.
     shape: String,
     /// File that was written.
     output: String,

@@ -99,10 +99,10 @@ pub struct Solid {
     pub texture_voxels: usize,
 }
 
-/// Largest number of voxels along a side; more would take longer than the rest of the synthesis and are left to
-/// `export`.
+/// Largest number of voxels along a side; more would take longer than the rest of the synthesis, and `export` writes
+/// them.
 const MOST_VOXELS: usize = 2048;
-/// Ten bins would leave steps in the profile sizes of the solid's sections; the report shows confidence intervals.
+/// With ten bins the profile sizes on sections of the solid would show steps. The report shows confidence intervals.
 const DEFAULTS: Defaults = Defaults {
     bins: 16,
     replicates: Some(200),

@@ -12,7 +12,7 @@ use stereology::unfold::{self, Bootstrap, Resampling, UnfoldOptions};
 use crate::failure::{Explain, Failure, body};
 use crate::values::{BinCount, CappingAngle, Edges, MaxSize, ShapeShare, count, positive, share, shares};
 
-/// Defaults that depend on the command.
+/// Defaults that differ between commands.
 #[derive(Clone, Copy, Debug)]
 pub struct Defaults {
     /// Size bins.
@@ -26,7 +26,7 @@ pub struct Defaults {
 #[command(next_help_heading = "Unfolding")]
 #[group(id = "unfold-choices")]
 pub struct Choices {
-    /// Number of size bins between 0 and the largest size; auto: as many as hold five profiles each, at most 2 n^(1/3)
+    /// Number of size bins between 0 and the largest size; auto: as many as have five profiles each, at most 2 n^(1/3)
     /// for n profiles [default: 10; 16 for synthesize, because sections of the solid show the steps of coarser bins]
     #[arg(long, value_name = "N|auto", conflicts_with = "edges")]
     pub bins: Option<BinCount>,
@@ -40,14 +40,14 @@ pub struct Choices {
     #[arg(long, value_name = "SHAPE[=F]")]
     pub shape: Vec<ShapeShare>,
     /// Largest particle size: a length, `profile` (size of the largest profile), `corrected` (the same, corrected for
-    /// its bias) or `likelihood` (most likely size) [default: profile]
+    /// its bias) or `likelihood` (maximum-likelihood size) [default: profile]
     #[arg(long, value_name = "D", conflicts_with = "edges")]
     pub max_size: Option<MaxSize>,
     /// Detection limit: smaller profiles are ignored and smaller particles are not estimated
     #[arg(long, value_name = "T", value_parser = positive)]
     pub min_size: Option<f64>,
     /// Capping angle in degrees (Keiding and Jensen): a particle of size D shows no profile smaller than D times the
-    /// sine of this angle; fit: the most likely angle
+    /// sine of this angle; fit: the maximum-likelihood angle
     #[arg(long, value_name = "DEGREES|fit")]
     pub capping_angle: Option<CappingAngle>,
     /// Method of estimation

@@ -30,7 +30,7 @@ pub use edge_rule::EdgeRule;
 pub use figures::UnfoldingFields;
 use figures::{CategoryFields, GroupFields, categories};
 
-/// Ten bins, and no intervals unless asked.
+/// Ten bins, and no confidence intervals unless requested.
 const DEFAULTS: Defaults = Defaults {
     bins: 10,
     replicates: None,
@@ -112,13 +112,13 @@ fn rows(found: &ParticleDensities) -> DensityRows {
 pub struct UnfoldFields {
     #[serde(flatten)]
     all: UnfoldingFields,
-    /// Densities of each particle type; if the table has types.
+    /// Densities of each particle type; only if the table has types.
     #[serde(skip_serializing_if = "Option::is_none")]
     types: Option<Vec<TypeFields>>,
-    /// Densities of each colour category; if there are several.
+    /// Densities of each colour category; only if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     categories: Option<Vec<CategoryFields>>,
-    /// Densities of all categories together; if there are several.
+    /// Densities of all categories together; only if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     categories_sum: Option<GroupFields>,
     /// Largest particle size; with --max-size likelihood.
@@ -134,7 +134,7 @@ pub struct UnfoldFields {
 /// Densities of a particle type.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct TypeFields {
-    /// The shape as it was given.
+    /// Description of the shape, as on the command line.
     shape: String,
     /// Particles per unit volume in each bin; null where a bin lies wholly below the detection limit.
     number_density: Vec<Option<f64>>,
@@ -193,7 +193,7 @@ impl Unfold {
     fn measured(&self, scale: f64) -> Result<MeasuredProfiles, Failure> {
         let mut profiles = profiles::read(&self.profiles).at(&self.profiles)?;
         if let Some(rule) = self.edge_rule {
-            // Boxes and window in the unit of the table: weights have none.
+            // Bounding boxes and window are both in the unit of the table, and weights have no unit.
             rule.weigh(&mut profiles, self.window.map(|Window(sides)| sides))?;
         }
         Ok(MeasuredProfiles {

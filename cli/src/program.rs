@@ -233,7 +233,7 @@ mod tests {
             (
                 Some("3"),
                 Some("not given"),
-                Some("not given: the photograph's area fraction"),
+                Some("not given: the area fraction of the photograph"),
                 None
             )
         );

@@ -182,7 +182,7 @@ fn bad_distributions_and_meshes_are_refused() {
     };
     let displace: &[&str] = &["displace", &mesh, "--contact", &contact, "--units", "10", "-o", &out];
     fs::write(&contact, r#"{"bin_width": 1, "negative": [1], "positive": [1]}"#).unwrap();
-    refused("subdivide", displace);
+    refused("refine the mesh", displace);
     for (text, what) in [
         ("", "contact distribution"),
         (r#"{"bin_width": 1, "negative": [], "positive": []}"#, "empty"),

@@ -106,10 +106,13 @@ fn answers_follow_their_schemas() {
     }
     fs::write(file("profiles.csv"), table).unwrap();
     let profiles = file("profiles.csv");
+    let sizes: String = (0..60).map(|k| format!("{},{}\n", k % 9 + 2, k % 3)).collect();
+    fs::write(file("one-type.csv"), format!("size,category\n{sizes}")).unwrap();
+    let one_type = file("one-type.csv");
     let calls: [&[&str]; 5] = [
         &["kmatrix", "box:1,1,2", "--bins", "4", "--directions", "50", "--paper"],
         &["shape", "rock:1", "-o", &file("rock.obj")],
-        &["unfold", &profiles, "--area", "1e5", "--bins", "4", "--bootstrap", "5"],
+        &["unfold", &one_type, "--area", "1e5", "--bins", "4", "--bootstrap", "5"],
         &[
             "unfold",
             &profiles,

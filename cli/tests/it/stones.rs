@@ -329,7 +329,7 @@ fn what_cannot_be_grown_or_measured_says_why() {
     for (exemplar, volume, part) in [
         ("stone.png", "text.npy", "text.npy"),
         ("stone.png", "stone.png", "--slices xy"),
-        ("flat.png", "stone.png", "one grey level"),
+        ("flat.png", "stone.png", "same grey level"),
         ("tiny.png", "stone.png", "16 x 16"),
         ("missing.png", "stone.png", "missing.png"),
     ] {

@@ -96,7 +96,7 @@ fn meshes() {
         refined(&ball, Subdivision::Midpoint, 1e-6)
             .unwrap_err()
             .to_string()
-            .contains("longer edges")
+            .contains("larger length")
     );
     assert!(refined(&ball, Subdivision::Loop, -1.0).is_err());
 }

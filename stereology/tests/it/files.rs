@@ -234,7 +234,7 @@ fn damaged_solids_are_refused() {
     let end = good.len();
     not_finite[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
     for (bad, said) in [
-        (good[..end - 100].to_vec(), "cut off"),
+        (good[..end - 100].to_vec(), "truncated"),
         (b"no array".to_vec(), "texture.npy"),
         (not_finite, "finite"),
     ] {

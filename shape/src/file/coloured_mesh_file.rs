@@ -1,6 +1,6 @@
 //! Files of meshes with a colour per vertex: GLB for Blender and browsers, PLY for MeshLab.
 
-use crate::file::glb::{Corners, Glb, alpha_mode};
+use crate::file::glb::{Corners, Glb};
 use crate::file::mesh_file::{check_indices, write_whole};
 use crate::file::mesh_file_error::MeshFileError;
 use crate::mesh::coloured_mesh::ColouredMesh;
@@ -91,13 +91,13 @@ fn ply(out: &mut impl Write, of: &ColouredMesh) -> io::Result<()> {
 fn glb(out: &mut impl Write, coloured: &ColouredMesh) -> io::Result<()> {
     let ColouredMesh { mesh, colours, normals } = coloured;
     let corners = Corners::new(mesh, normals, |_, _| [0.0; 2]);
-    let mut glb = Glb::default();
-    let attributes = glb.colours(&corners, |vertex| {
+    let mut glb = Glb::new(coloured.is_opaque());
+    glb.add_colours(&corners, |vertex| {
         let [r, g, b, a] = colours[vertex as usize];
-        let shares = [linear(r), linear(g), linear(b), a.clamp(0.0, 1.0)];
-        shares.map(|share| (share * 65535.0).round() as u16)
+        let channels = [linear(r), linear(g), linear(b), a.clamp(0.0, 1.0)];
+        channels.map(|value| (value * 65535.0).round() as u16)
     });
-    glb.write(out, mesh, &corners, &attributes, [alpha_mode(coloured.is_opaque()), ""])
+    glb.write(out, mesh, &corners)
 }
 
 /// Linear light of an sRGB-encoded value.

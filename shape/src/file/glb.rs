@@ -3,15 +3,18 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
+use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf_json::buffer::{Target, View};
+use gltf_json::image::MimeType;
+use gltf_json::material::{AlphaCutoff, AlphaMode, StrengthFactor};
+use gltf_json::mesh::{Mode, Primitive, Semantic};
+use gltf_json::serialize::to_value;
+use gltf_json::texture::{Info, MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf_json::validation::Checked::{self, Valid};
+use gltf_json::{Accessor, Buffer, Extras, Image, Index, Material, Mesh, Node, Root, Scene, Texture, Value};
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::triangle_mesh::TriangleMesh;
-
-const VERTICES: u32 = 34962;
-const INDICES: u32 = 34963;
-const FLOAT: u32 = 5126;
-const U16: u32 = 5123;
-const U32: u32 = 5125;
 
 /// Vertices of a GLB: those of the mesh, once for each normal and place in the texture they have.
 pub(crate) struct Corners {
@@ -57,163 +60,226 @@ impl Corners {
     }
 }
 
-/// A GLB as it is put together.
-#[derive(Default)]
+/// A GLB while it is put together: the document, the binary chunk, and what its mesh will consist of.
 pub(crate) struct Glb {
+    root: Root,
     data: Vec<u8>,
-    views: Vec<String>,
-    accessors: Vec<String>,
-    /// Members of the document beside the mesh: `"images":[...],` and so on, each with its comma.
-    extras: String,
+    material: Material,
+    attributes: BTreeMap<Checked<Semantic>, Index<Accessor>>,
 }
 
 impl Glb {
-    fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
-        let target = target.map_or_else(String::new, |target| format!(r#","target":{target}"#));
-        let (from, length) = (self.data.len(), bytes.len());
-        self.views.push(format!(
-            r#"{{"buffer":0,"byteOffset":{from},"byteLength":{length}{target}}}"#
-        ));
+    /// A file without a mesh. If the mesh is not `opaque`, it is cut out where alpha is below 0.5.
+    pub(crate) fn new(opaque: bool) -> Self {
+        let mut root = Root::default();
+        root.asset.generator = Some("stereology".to_owned());
+        let mut material = Material {
+            double_sided: true,
+            ..Material::default()
+        };
+        material.pbr_metallic_roughness.metallic_factor = StrengthFactor(0.0);
+        material.pbr_metallic_roughness.roughness_factor = StrengthFactor(0.6);
+        if !opaque {
+            material.alpha_mode = Valid(AlphaMode::Mask);
+            material.alpha_cutoff = Some(AlphaCutoff(0.5));
+        }
+        Self {
+            root,
+            data: Vec::new(),
+            material,
+            attributes: BTreeMap::new(),
+        }
+    }
+
+    fn add_view(&mut self, bytes: &[u8], target: Option<Target>) -> Index<View> {
+        let view = View {
+            buffer: Index::new(0),
+            byte_length: bytes.len().into(),
+            byte_offset: Some(self.data.len().into()),
+            byte_stride: None,
+            name: None,
+            target: target.map(Valid),
+            extensions: None,
+            extras: Extras::default(),
+        };
         self.data.extend(bytes);
         self.data.resize(self.data.len().next_multiple_of(4), 0);
-        self.views.len() - 1
+        self.root.push(view)
     }
 
-    fn accessor(&mut self, bytes: &[u8], target: u32, form: &str) -> usize {
-        let view = self.view(bytes, Some(target));
-        self.accessors.push(format!(r#"{{"bufferView":{view},{form}}}"#));
-        self.accessors.len() - 1
+    /// Adds `bytes` to the binary chunk and returns an accessor of all values in them.
+    fn accessor(&mut self, bytes: &[u8], target: Target, component: ComponentType, type_: Type) -> Accessor {
+        Accessor {
+            buffer_view: Some(self.add_view(bytes, Some(target))),
+            byte_offset: None,
+            count: (bytes.len() / (component.size() * type_.multiplicity())).into(),
+            component_type: Valid(GenericComponentType(component)),
+            extensions: None,
+            extras: Extras::default(),
+            type_: Valid(type_),
+            min: None,
+            max: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+        }
     }
 
-    /// A PNG as the only texture: its index.
-    pub(crate) fn texture(&mut self, png: &[u8]) -> usize {
-        let view = self.view(png, None);
-        // Linear filters, mip maps; no repetition.
-        self.extras = format!(
-            concat!(
-                r#""images":[{{"bufferView":{},"mimeType":"image/png"}}],"#,
-                r#""samplers":[{{"magFilter":9729,"minFilter":9987,"wrapS":33071,"wrapT":33071}}],"#,
-                r#""textures":[{{"source":0,"sampler":0}}],"#
-            ),
-            view
-        );
-        0
+    fn float_accessor(&mut self, values: impl Iterator<Item = f32>, type_: Type) -> Accessor {
+        let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+        self.accessor(&bytes, Target::ArrayBuffer, ComponentType::F32, type_)
     }
 
-    /// Colours of 16 bits and four channels as an attribute.
-    pub(crate) fn colours(&mut self, corners: &Corners, of_vertex: impl Fn(u32) -> [u16; 4]) -> String {
+    fn add_attribute(&mut self, semantic: Semantic, accessor: Accessor) {
+        let index = self.root.push(accessor);
+        self.attributes.insert(Valid(semantic), index);
+    }
+
+    /// Adds a PNG as the texture of the material: linear filters, mip maps, no repetition.
+    pub(crate) fn add_texture(&mut self, png: &[u8]) {
+        let view = self.add_view(png, None);
+        let source = self.root.push(Image {
+            buffer_view: Some(view),
+            mime_type: Some(MimeType("image/png".to_owned())),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: Extras::default(),
+        });
+        let sampler = self.root.push(Sampler {
+            mag_filter: Some(Valid(MagFilter::Linear)),
+            min_filter: Some(Valid(MinFilter::LinearMipmapLinear)),
+            wrap_s: Valid(WrappingMode::ClampToEdge),
+            wrap_t: Valid(WrappingMode::ClampToEdge),
+            ..Sampler::default()
+        });
+        let texture = self.root.push(Texture {
+            name: None,
+            sampler: Some(sampler),
+            source,
+            extensions: None,
+            extras: Extras::default(),
+        });
+        self.material.pbr_metallic_roughness.base_color_texture = Some(Info {
+            index: texture,
+            tex_coord: 0,
+            extensions: None,
+            extras: Extras::default(),
+        });
+    }
+
+    /// Adds colours in linear light, of four channels of 16 bits.
+    pub(crate) fn add_colours(&mut self, corners: &Corners, of_vertex: impl Fn(u32) -> [u16; 4]) {
         let colours = corners.of.iter().flat_map(|corner| of_vertex(corner.vertex));
         let bytes: Vec<u8> = colours.flat_map(u16::to_le_bytes).collect();
-        let count = corners.of.len();
-        let form = format!(r#""componentType":{U16},"normalized":true,"count":{count},"type":"VEC4""#);
-        format!(r#","COLOR_0":{}"#, self.accessor(&bytes, VERTICES, &form))
+        let mut accessor = self.accessor(&bytes, Target::ArrayBuffer, ComponentType::U16, Type::Vec4);
+        accessor.normalized = true;
+        self.add_attribute(Semantic::Colors(0), accessor);
     }
 
-    /// Places in the texture as an attribute.
-    pub(crate) fn uvs(&mut self, corners: &Corners) -> String {
-        let uvs = corners.of.iter().flat_map(|corner| corner.uv);
-        let bytes: Vec<u8> = uvs.flat_map(f32::to_le_bytes).collect();
-        let count = corners.of.len();
-        let form = format!(r#""componentType":{FLOAT},"count":{count},"type":"VEC2""#);
-        format!(r#","TEXCOORD_0":{}"#, self.accessor(&bytes, VERTICES, &form))
+    /// Adds the texture coordinates.
+    pub(crate) fn add_uvs(&mut self, corners: &Corners) {
+        let accessor = self.float_accessor(corners.of.iter().flat_map(|corner| corner.uv), Type::Vec2);
+        self.add_attribute(Semantic::TexCoords(0), accessor);
     }
 
-    /// Writes the file: positions, normals, the other `attributes`, and the material's members beside its roughness.
+    /// Adds the mesh and writes the file.
     ///
-    /// Single precision loses a mesh far from the origin, so it is written about its centre and moved there by its
-    /// node.
+    /// Single precision is too coarse for a mesh far from the origin, so positions are relative to the centre of the
+    /// bounding box, and the node's translation is that centre.
+    pub(crate) fn write(mut self, out: &mut impl Write, mesh: &TriangleMesh, corners: &Corners) -> io::Result<()> {
+        let bounds = bounds(mesh);
+        let centre = nalgebra::center(&bounds[0], &bounds[1]);
+        self.add_positions(mesh, corners, bounds, centre);
+        let normals = self.float_accessor(corners.of.iter().flat_map(|corner| corner.normal), Type::Vec3);
+        self.add_attribute(Semantic::Normals, normals);
+        let indices = corners.triangles.iter().flatten();
+        let bytes: Vec<u8> = indices.flat_map(|i| i.to_le_bytes()).collect();
+        let indices = self.accessor(&bytes, Target::ElementArrayBuffer, ComponentType::U32, Type::Scalar);
+        let indices = self.root.push(indices);
+        let (root, data) = self.into_scene(indices);
+
+        let mut document = to_value(root)?;
+        // The translation of `gltf_json::Node` is in single precision.
+        document["nodes"][0]["translation"] = <[f64; 3]>::from(centre.coords).into();
+        write_chunks(out, document.to_string().into_bytes(), &data)
+    }
+
+    /// Adds positions relative to `centre`, with their bounds.
     #[allow(clippy::cast_possible_truncation, reason = "GLB is single precision")]
-    pub(crate) fn write(
-        mut self,
-        out: &mut impl Write,
-        mesh: &TriangleMesh,
-        corners: &Corners,
-        attributes: &str,
-        [material, surface]: [&str; 2],
-    ) -> io::Result<()> {
-        let (low, high) = bounds(mesh);
-        let centre = nalgebra::center(&low, &high);
-        let single = |v: Vector3<f64>| -> [f32; 3] { v.map(|x| x as f32).into() };
-        let place = |corner: &Corner| single(mesh.vertices[corner.vertex as usize] - centre);
-        let bytes =
-            |values: Vec<[f32; 3]>| -> Vec<u8> { values.into_iter().flatten().flat_map(f32::to_le_bytes).collect() };
-        let count = corners.of.len();
-        let (low, high) = (single(low - centre), single(high - centre));
-        let positions = self.accessor(
-            &bytes(corners.of.iter().map(place).collect()),
-            VERTICES,
-            &format!(
-                r#""componentType":{FLOAT},"count":{count},"type":"VEC3","min":[{},{},{}],"max":[{},{},{}]"#,
-                low[0], low[1], low[2], high[0], high[1], high[2]
-            ),
-        );
-        let normals = self.accessor(
-            &bytes(corners.of.iter().map(|corner| corner.normal).collect()),
-            VERTICES,
-            &format!(r#""componentType":{FLOAT},"count":{count},"type":"VEC3""#),
-        );
-        let indices: Vec<u8> = corners
-            .triangles
-            .iter()
-            .flatten()
-            .flat_map(|i| i.to_le_bytes())
-            .collect();
-        let count = 3 * corners.triangles.len();
-        let indices = self.accessor(
-            &indices,
-            INDICES,
-            &format!(r#""componentType":{U32},"count":{count},"type":"SCALAR""#),
-        );
-        let Point3 { coords: c } = centre;
-        let json = format!(
-            concat!(
-                r#"{{"asset":{{"version":"2.0","generator":"stereology"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0,"translation":[{},{},{}]}}],"#,
-                r#""materials":[{{{}"doubleSided":true,"pbrMetallicRoughness":{{{}"metallicFactor":0,"roughnessFactor":0.6}}}}],{}"#,
-                r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":{},"NORMAL":{}{}}},"indices":{},"material":0}}]}}],"#,
-                r#""accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#
-            ),
-            c.x,
-            c.y,
-            c.z,
+    fn add_positions(&mut self, mesh: &TriangleMesh, corners: &Corners, bounds: [Point3<f64>; 2], centre: Point3<f64>) {
+        let relative = |p: Point3<f64>| -> [f32; 3] { (p - centre).map(|x| x as f32).into() };
+        let vertices = corners.of.iter().map(|corner| mesh.vertices[corner.vertex as usize]);
+        let mut accessor = self.float_accessor(vertices.flat_map(relative), Type::Vec3);
+        let [min, max] = bounds.map(|corner| Value::from(relative(corner)));
+        (accessor.min, accessor.max) = (Some(min), Some(max));
+        self.add_attribute(Semantic::Positions, accessor);
+    }
+
+    /// The document, with a scene of one node of one mesh, and the binary chunk.
+    fn into_scene(self, indices: Index<Accessor>) -> (Root, Vec<u8>) {
+        let Self {
+            mut root,
+            data,
             material,
-            surface,
-            self.extras,
-            positions,
-            normals,
             attributes,
-            indices,
-            self.accessors.join(","),
-            self.views.join(","),
-            self.data.len()
-        );
-        let mut json = json.into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let length = |bytes: usize| {
-            u32::try_from(bytes)
-                .map_err(|_| io::Error::other("a GLB holds at most 4 GB; take a mesh of fewer triangles"))
+        } = self;
+        let material = root.push(material);
+        let primitive = Primitive {
+            attributes,
+            extensions: None,
+            extras: Extras::default(),
+            indices: Some(indices),
+            material: Some(material),
+            mode: Valid(Mode::Triangles),
+            targets: None,
         };
-        let whole = length(12 + 8 + json.len() + 8 + self.data.len())?;
-        out.write_all(b"glTF\x02\0\0\0")?;
-        out.write_all(&whole.to_le_bytes())?;
-        for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &self.data)] {
-            out.write_all(&length(chunk.len())?.to_le_bytes())?;
-            out.write_all(kind)?;
-            out.write_all(chunk)?;
-        }
-        Ok(())
+        let mesh = root.push(Mesh {
+            extensions: None,
+            extras: Extras::default(),
+            name: None,
+            primitives: vec![primitive],
+            weights: None,
+        });
+        let node = root.push(Node {
+            mesh: Some(mesh),
+            ..Node::default()
+        });
+        root.scene = Some(root.push(Scene {
+            extensions: None,
+            extras: Extras::default(),
+            name: None,
+            nodes: vec![node],
+        }));
+        root.push(Buffer {
+            byte_length: data.len().into(),
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: Extras::default(),
+        });
+        (root, data)
     }
 }
 
-/// What is transparent is cut out: half between what is seen and a hole is the hole's rim.
-pub(crate) fn alpha_mode(opaque: bool) -> &'static str {
-    if opaque {
-        ""
-    } else {
-        r#""alphaMode":"MASK","alphaCutoff":0.5,"#
+/// Writes the header and both chunks. The length of `data` must be a multiple of 4.
+fn write_chunks(out: &mut impl Write, mut json: Vec<u8>, data: &[u8]) -> io::Result<()> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let length = |bytes: usize| {
+        u32::try_from(bytes).map_err(|_| io::Error::other("a GLB holds at most 4 GB; take a mesh of fewer triangles"))
+    };
+    let whole = length(12 + 8 + json.len() + 8 + data.len())?;
+    out.write_all(b"glTF\x02\0\0\0")?;
+    out.write_all(&whole.to_le_bytes())?;
+    for (kind, chunk) in [(b"JSON", &*json), (b"BIN\0", data)] {
+        out.write_all(&length(chunk.len())?.to_le_bytes())?;
+        out.write_all(kind)?;
+        out.write_all(chunk)?;
     }
+    Ok(())
 }
 
-fn bounds(mesh: &TriangleMesh) -> (Point3<f64>, Point3<f64>) {
+fn bounds(mesh: &TriangleMesh) -> [Point3<f64>; 2] {
     let each = |from: f64, nearer: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
         let coordinates = mesh
             .triangles
@@ -222,5 +288,5 @@ fn bounds(mesh: &TriangleMesh) -> (Point3<f64>, Point3<f64>) {
             .map(|&i| mesh.vertices[i as usize].coords);
         Point3::from(coordinates.fold(Vector3::repeat(from), |far, v| nearer(&far, &v)))
     };
-    (each(f64::INFINITY, Vector3::inf), each(f64::NEG_INFINITY, Vector3::sup))
+    [each(f64::INFINITY, Vector3::inf), each(f64::NEG_INFINITY, Vector3::sup)]
 }

@@ -9,6 +9,8 @@
 mod bodies;
 #[cfg(feature = "io")]
 mod files;
+#[cfg(feature = "io")]
+mod glb;
 mod meshes;
 mod queries;
 mod random_shapes;

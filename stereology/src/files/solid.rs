@@ -107,7 +107,7 @@ pub struct SavedSolid {
     pub shapes: Vec<String>,
 }
 
-/// Reads the folder that [`write`] wrote.
+/// Reads the folder that [`write()`] wrote.
 ///
 /// # Errors
 ///

@@ -78,7 +78,7 @@ fn array(
     writeln!(out, "</DataArray>")
 }
 
-/// Reads the particles of a file that [`write`] wrote.
+/// Reads the particles of a file that [`write()`] wrote.
 ///
 /// # Errors
 ///

@@ -55,7 +55,7 @@ pub fn write(path: impl AsRef<Path>, arrangement: &Arrangement) -> Result<(), Fi
     })?)
 }
 
-/// Reads particles and box of a file that [`write`] wrote.
+/// Reads particles and box of a file that [`write()`] wrote.
 ///
 /// # Errors
 ///

@@ -25,7 +25,7 @@ pub enum SolidError {
         width: usize,
     },
     /// The exemplar has one colour.
-    #[error("every pixel of the exemplar has the same colour: there is nothing to learn from it")]
+    #[error("every pixel of the exemplar has the same colour: it has no texture")]
     ConstantExemplar,
     /// The exemplar contains NaN or infinity.
     #[error("the exemplar's pixel at row {row}, column {column} is NaN or infinite")]

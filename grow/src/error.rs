@@ -17,7 +17,7 @@ pub enum GrowError {
         window: usize,
     },
     /// The exemplar has one colour.
-    #[error("every pixel of the exemplar has the same colour: there is nothing to learn from it")]
+    #[error("every pixel of the exemplar has the same colour: it has no texture")]
     ConstantExemplar,
     /// The exemplar contains NaN or infinity.
     #[error("the exemplar's pixel at row {row}, column {column} is NaN or infinite")]
@@ -88,7 +88,7 @@ pub enum GrowError {
     #[error("the box has 4,294,967,295 voxels or more, or the exemplar that many samples; use a lower resolution")]
     TooLarge,
     /// Neither seeds nor measurements.
-    #[error("nothing to grow from: give measurements, or at least one seed")]
+    #[error("there is no seed: give measurements, or at least one seed")]
     NoSeeds,
     /// The exemplar cannot be halved that often.
     #[error(

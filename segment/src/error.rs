@@ -62,10 +62,10 @@ pub enum SegmentError {
     },
     /// Nothing differs clearly from the binder.
     #[error(
-        "no particle of at least {min_area} pixels differs clearly from the binder; give the binder's colour, lower the least area, or import a label map drawn by hand or by another tool"
+        "no particle of at least {min_area} pixels differs clearly from the binder; give the binder's colour, lower the minimum area, or import a label map drawn by hand or by another tool"
     )]
     NoParticles {
-        /// Requested least area, pixels.
+        /// Requested minimum area, pixels.
         min_area: usize,
     },
     /// The label map does not fit the photo.

@@ -18,7 +18,7 @@ use stereology_metrics::Finding;
 const FEW: usize = 50;
 /// Percentage of profiles at the photo's edge beyond which there is a warning.
 const EDGE: f64 = 20.0;
-/// Percentage of profiles near the least area beyond which there is a warning.
+/// Percentage of profiles near the minimum area above which there is a warning.
 const SMALL: f64 = 10.0;
 /// Factors by which a parameter is varied.
 const FACTORS: [f32; 3] = [0.8, 1.0, 1.2];
@@ -44,7 +44,7 @@ pub(crate) fn profile_findings(
         findings.push(Finding::new(
             "area-fraction",
             format!(
-                "{:.2} % of the photo are profiles, which is unusual for particles in a binder: look at the overlay",
+                "profiles cover {:.2} % of the photo, which is unusual for particles in a binder: look at the overlay",
                 100.0 * area_fraction
             ),
         ));
@@ -52,7 +52,7 @@ pub(crate) fn profile_findings(
     let n = profiles.len();
     let percent = |k: usize| 100.0 * k as f64 / n.max(1) as f64;
     if n < FEW {
-        findings.push(Finding::new("few-profiles", format!("{n} profiles; size distributions need at least 50, better some hundreds: use a larger photo, or several")));
+        findings.push(Finding::new("few-profiles", format!("{n} profiles; size distributions need at least 50, preferably several hundred: use a larger photo, or several")));
     }
     let cut = percent(profiles.iter().filter(|p| p.touches_edge).count());
     if frame_limited {
@@ -66,7 +66,7 @@ pub(crate) fn profile_findings(
     let is_small = |p: &&Profile| p.area < 1.5 * options.min_area as f64;
     let small = percent(profiles.iter().filter(is_small).count());
     if small > SMALL {
-        findings.push(Finding::new("near-minimum", format!("{small:.0} % of the profiles are within half of the least area of {} pixels: many more may be too small to be detected; use a photo of higher resolution", options.min_area)));
+        findings.push(Finding::new("near-minimum", format!("{small:.0} % of the profiles are within half of the minimum area of {} pixels: many more may be too small to be detected; use a photo of higher resolution", options.min_area)));
     }
     findings
 }
@@ -86,23 +86,23 @@ pub(crate) fn count_findings(thresholds: [usize; 3], rise: [usize; 3]) -> Vec<Fi
     findings
 }
 
-/// Whether there is a binder: it covers the fraction `covered` of the photo, and `is_clear` if the particles stand
-/// apart from it.
+/// Warns if there is probably no binder. The binder covers the fraction `covered` of the photo; `is_clear` if the
+/// colours of the particles differ clearly from it.
 pub(crate) fn binder_finding(covered: f64, is_clear: bool, area_fraction: f64) -> Option<Finding> {
     let advice = "give its colour if there is one, or import a label map drawn by hand or by another tool";
     let percent = |fraction: f64| 100.0 * fraction;
     let message = if covered < LEAST_COVERED {
         format!(
-            "the likeliest binder covers only {:.0} % of the photo; {advice}",
+            "the most likely binder colour covers only {:.0} % of the photo; {advice}",
             percent(covered)
         )
     } else if !is_clear {
         format!(
-            "most of what differs from the likeliest binder differs by little: their colours overlap, and outlines are arbitrary; {advice}"
+            "most pixels that differ from the most likely binder colour differ only slightly: the colours overlap, and outlines are arbitrary; {advice}"
         )
     } else if area_fraction > ALL {
         format!(
-            "{:.0} % of the photo would be particles; {advice}",
+            "particles would cover {:.0} % of the photo; {advice}",
             percent(area_fraction)
         )
     } else {

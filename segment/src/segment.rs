@@ -84,7 +84,7 @@ pub fn segment(
     out.findings
         .extend(binder_finding(seen.covered, seen.is_clear, out.area_fraction));
     if matches!(seen.ground, Ground::Densest) {
-        out.findings.push(Finding::new("vague-binder", "binder and particle colours overlap: what differs clearly from the commonest colour is outlined, and particles of the binder's own colours are missed; look at the overlay, give the binder's colour, or import a label map"));
+        out.findings.push(Finding::new("vague-binder", "binder and particle colours overlap: regions that differ clearly from the most common colour are outlined, and particles with colours of the binder are missed; look at the overlay, give the binder's colour, or import a label map"));
     }
     let by_threshold = counts_by_threshold(&seen.distance, &seen.deviation, seen.thresholds, options);
     out.findings.extend(count_findings(by_threshold, by_rise));

@@ -9,7 +9,7 @@ use stereology_metrics::Finding;
 
 /// The inverse gave negative densities.
 const NEGATIVE: &str = "negative-bins";
-/// Densities of neighbouring bins swing up and down.
+/// Densities of neighbouring bins oscillate.
 const OSCILLATING: &str = "oscillating-bins";
 
 /// A finding that names the number of equal bins that cures it: the largest below `bins` for which `unfold_again`,
@@ -21,7 +21,7 @@ const OSCILLATING: &str = "oscillating-bins";
 /// use stereology_unfold::{Finding, with_cure};
 /// let found = Finding::new("negative-bins", "one density is negative");
 /// let cured = with_cure(&found, 10, &|bins| if bins > 6 { vec![found.clone()] } else { Vec::new() });
-/// assert_eq!(cured.message, "one density is negative. 6 equal bins are the most without it");
+/// assert_eq!(cured.message, "one density is negative. The largest number of equal bins without it is 6");
 /// ```
 #[must_use]
 pub fn with_cure(finding: &Finding, bins: usize, unfold_again: &dyn Fn(usize) -> Vec<Finding>) -> Finding {
@@ -33,11 +33,14 @@ pub fn with_cure(finding: &Finding, bins: usize, unfold_again: &dyn Fn(usize) ->
         None => finding.clone(),
         Some(1) => Finding::new(
             finding.code,
-            format!("{}. One bin is the most without it", finding.message),
+            format!("{}. The largest number of bins without it is 1", finding.message),
         ),
         Some(enough) => Finding::new(
             finding.code,
-            format!("{}. {enough} equal bins are the most without it", finding.message),
+            format!(
+                "{}. The largest number of equal bins without it is {enough}",
+                finding.message
+            ),
         ),
     }
 }
@@ -176,7 +179,7 @@ pub(crate) fn oscillation(densities: &[f64]) -> Option<Finding> {
         Finding::new(
             OSCILLATING,
             format!(
-                "densities swing up and down from bin {} to bin {}: magnified noise of the counts; use fewer bins or the method auto",
+                "densities oscillate from bin {} to bin {}: amplified noise of the counts; use fewer bins or the method auto",
                 best.0 + 1,
                 best.1 + 1
             ),

@@ -68,7 +68,7 @@ pub enum KernelError {
     #[error("the capping angle is {0}: it must lie from 0 to below a right angle, in radians")]
     CappingAngle(f64),
     /// Invalid fractions, or not one per kernel.
-    #[error("{fractions} fractions for {kernels} kernels: give one a kernel, finite and not negative, not all zero")]
+    #[error("{fractions} fractions for {kernels} kernels: give one per kernel, finite and not negative, not all zero")]
     Fractions {
         /// Number of fractions.
         fractions: usize,
@@ -76,7 +76,7 @@ pub enum KernelError {
         kernels: usize,
     },
     /// Kernels of different bins.
-    #[error("kernel {index} has other bins than the first: kernels are mixed on common bins")]
+    #[error("the bins of kernel {index} differ from those of the first: mixed kernels need the same bins")]
     Bins {
         /// Which, from 0.
         index: usize,
@@ -148,7 +148,7 @@ impl Kernel {
     ///
     /// # Errors
     ///
-    /// [`KernelError`] if there is no kernel, bins differ or fractions are not one a kernel.
+    /// [`KernelError`] if there is no kernel, bins differ or fractions are not one per kernel.
     pub fn mix(kernels: &[Self], fractions: &[f64]) -> Result<Self, KernelError> {
         let matrices: Vec<_> = kernels.iter().map(|kernel| kernel.matrix.clone()).collect();
         let matrix = mix_kernels(&matrices, fractions)?;
@@ -208,7 +208,7 @@ impl Kernel {
 ///
 /// # Errors
 ///
-/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one a kernel, finite, not negative and not
+/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one per kernel, finite, not negative and not
 /// all zero.
 ///
 /// ```

@@ -30,7 +30,7 @@ pub enum UnfoldError {
     #[error("the kernel is singular: merge size bins, or use nnls or em")]
     Singular,
     /// Profiles of a size that no particle can show.
-    #[error("profile bin {} holds profiles, but no particle of the kernel shows any there: check the edges and the largest size", .bin + 1)]
+    #[error("profile bin {} contains profiles, but no particle of the kernel gives profiles there: check the edges and the largest size", .bin + 1)]
     Unexplained {
         /// Profile bin, from 0.
         bin: usize,
@@ -57,7 +57,7 @@ pub enum UnfoldError {
     TooFewSlices(usize),
     /// Several types on different bins, or no type.
     #[error(
-        "type {index} has other bins than the first, or there is no type: several types are unfolded on common edges"
+        "the bins of type {index} differ from those of the first, or there is no type: several types need common edges"
     )]
     Bins {
         /// Which, from 0.

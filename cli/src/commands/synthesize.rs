@@ -230,9 +230,9 @@ pub struct TexturedPhoto {
     mode: &'static str,
     /// Number of iterations.
     iterations: usize,
-    /// Synthesis of the binder's texture; null if it was left plain.
+    /// Synthesis of the binder's texture; null if it has a uniform colour.
     binder: Option<Resynthesis>,
-    /// Synthesis of the particles' texture; null if it was left plain.
+    /// Synthesis of the particles' texture; null if it has a uniform colour.
     particles: Option<Resynthesis>,
 }
 

@@ -166,7 +166,7 @@ fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)
     let drawn = crate::labels::profile::distinct(&labels).len();
     let lost = found.len() - drawn + without_area;
     if lost > 0 {
-        findings.push(Finding::new("lost-labels", format!("{lost} of {} outlines hold no pixel's centre of their own (points, lines, slivers, or covered by others) and are left out", found.len() + without_area)));
+        findings.push(Finding::new("lost-labels", format!("{lost} of {} outlines contain no pixel centre of their own (points, lines, slivers, or covered by others) and are left out", found.len() + without_area)));
     }
     Ok(LabelFile { labels, findings })
 }

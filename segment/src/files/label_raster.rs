@@ -67,9 +67,7 @@ pub(crate) fn parse_tiff(bytes: &[u8]) -> Result<(Array2<u32>, Vec<Finding>), St
     let findings = (pages > 1).then(|| {
         Finding::new(
             "first-page",
-            format!(
-                "the TIFF has {pages} pages; the first one was read: if another one belongs to the photo, save it alone"
-            ),
+            format!("the TIFF has {pages} pages; the first one was read: save only the page that belongs to the photo"),
         )
     });
     Ok((shaped((rows, columns), samples?)?, findings.into_iter().collect()))
@@ -146,7 +144,7 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array2<u32>, String> {
         .filter(|n| n.checked_mul(size) == Some(data.len()));
     if count.is_none() || size == 0 {
         return Err(format!(
-            "the header says {height} x {width} numbers of {size} bytes, but {} bytes follow; it is damaged or cut off",
+            "the header says {height} x {width} numbers of {size} bytes, but {} bytes follow; it is damaged or truncated",
             data.len()
         ));
     }

@@ -70,7 +70,7 @@ impl Segmentation {
         if largest == 255 || largest == 65_535 {
             findings.push(Finding::new(
                 "clipped-labels",
-                format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles beyond merged into one; export it as 32-bit TIFF"),
+                format!("the largest label is exactly {largest}: the map may have been written with too few bits, and the profiles with larger numbers merged into one; export it as 32-bit TIFF"),
             ));
         }
         let split = split_labels(&labels, &components);
@@ -90,7 +90,7 @@ impl Segmentation {
         if out.profiles.len() < given {
             findings.push(Finding::new(
                 "small-labels",
-                format!("{} of {given} labels have fewer than {} pixels and are left out; lower the least area to keep them", given - out.profiles.len(), options.min_area),
+                format!("{} of {given} labels have fewer than {} pixels and are left out; lower the minimum area to keep them", given - out.profiles.len(), options.min_area),
             ));
         }
         findings.append(&mut out.findings);

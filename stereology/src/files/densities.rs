@@ -207,7 +207,7 @@ fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
             .or_default();
         if bins.last().is_some_and(|last| (last[1] - a).abs() > 1e-9 * b) {
             return Err(format!(
-                "line {line}: the bin begins at {a}, but the one before ends elsewhere; bins follow each other"
+                "line {line}: the bin begins at {a}, which is not the end of the bin before it; bins must be contiguous"
             ));
         }
         bins.push([a, b, n]);

@@ -113,7 +113,7 @@ impl PackingFile {
                 return Err(FileError::value(
                     path,
                     format!(
-                        "particle {index} has shape {}, of {}",
+                        "particle {index} has shape {}, but there are {} shapes (numbered from 0)",
                         particle.shape,
                         file.shapes.len()
                     ),

@@ -355,7 +355,7 @@ fn findings(
     if settled.largest.as_ref().is_some_and(uncorrected) && options.max_size == LargestSize::Corrected {
         findings.push(Finding::new(
             "largest-uncorrected",
-            "the largest profiles are all of one size, so the largest size could not be extrapolated: the size of the largest profile was used",
+            "the largest profiles all have the same size, so the largest size could not be extrapolated: the size of the largest profile was used",
         ));
     }
     findings

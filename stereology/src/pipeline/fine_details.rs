@@ -95,7 +95,7 @@ pub fn fine_details(
                 findings.push(Finding::new(
                     "no-texture",
                     format!(
-                        "too few pixels of the photograph lie inside the {of} to learn its texture; it was left plain"
+                        "too few pixels of the photograph lie inside the {of} to measure its texture; it has a uniform colour"
                     ),
                 ));
                 Ok((Array4::zeros([voxels, voxels, voxels, 3]), None))

@@ -46,7 +46,7 @@ pub enum ParticleTypesError {
         why: String,
     },
     /// A share that is not a positive number.
-    #[error("{name}: the share of a shape must be a positive number, not {share}")]
+    #[error("{name}: the fraction of a shape must be a positive number, not {share}")]
     Share {
         /// Which shape.
         name: String,
@@ -54,7 +54,7 @@ pub enum ParticleTypesError {
         share: f64,
     },
     /// Another number of shares than of types.
-    #[error("{shares} shares for {types} shapes: give one share per shape")]
+    #[error("{shares} fractions for {types} shapes: give one fraction per shape")]
     Shares {
         /// Number of shares.
         shares: usize,
@@ -115,7 +115,7 @@ impl ParticleTypes {
     ///
     /// # Errors
     ///
-    /// [`ParticleTypesError::Shares`] unless there is one share per type; [`ParticleTypesError::Share`] for a share
+    /// [`ParticleTypesError::Shares`] unless there is one fraction per type; [`ParticleTypesError::Share`] for a share
     /// that is negative or not finite, or if all are zero.
     ///
     /// ```

@@ -6,7 +6,6 @@
 
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 
-use nalgebra::Vector3;
 use std::error::Error;
 use std::ops::ControlFlow;
 use stereology_anneal::{ConvexParts, PackOptions, Proxy, box_for_fraction, lognormal_sizes, mix, pack, populate};
@@ -47,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A square bar bent into a U.
 fn hook() -> TriangleMesh {
-    cells(&[
+    TriangleMesh::cubes(&[
         [0, 0, 0],
         [1, 0, 0],
         [2, 0, 0],
@@ -68,39 +67,5 @@ fn jack() -> TriangleMesh {
             arms.push(cell);
         }
     }
-    cells(&arms)
-}
-
-/// The surface of unit cubes that share faces.
-fn cells(cubes: &[[i32; 3]]) -> TriangleMesh {
-    let mut mesh = TriangleMesh {
-        vertices: Vec::new(),
-        triangles: Vec::new(),
-    };
-    for cube in cubes {
-        for axis in 0..3 {
-            for (side, beside) in [(0, -1), (1, 1)] {
-                let mut next = *cube;
-                next[axis] += beside;
-                if cubes.contains(&next) {
-                    continue;
-                }
-                let first = u32::try_from(mesh.vertices.len()).unwrap_or(u32::MAX);
-                for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
-                    let mut corner = Vector3::from(cube.map(f64::from));
-                    corner[axis] += f64::from(side);
-                    corner[(axis + 1) % 3] += f64::from(u);
-                    corner[(axis + 2) % 3] += f64::from(v);
-                    mesh.vertices.push(corner.into());
-                }
-                mesh.triangles.extend(if side == 1 {
-                    [[first, first + 1, first + 2], [first, first + 2, first + 3]]
-                } else {
-                    [[first, first + 2, first + 1], [first, first + 3, first + 2]]
-                });
-            }
-        }
-    }
-    mesh.weld();
-    mesh
+    TriangleMesh::cubes(&arms)
 }

@@ -109,6 +109,52 @@ impl TriangleMesh {
         Self { vertices, triangles }
     }
 
+    /// The surface of unit cubes at integer places: each cube is [i, i + 1] × [j, j + 1] × [k, k + 1], and faces that
+    /// two cubes share are left out. Cubes should share whole faces or nothing; those that touch along an edge alone
+    /// make a surface that is no [`ClosedMesh`](crate::ClosedMesh). Quadratic in the number of cubes.
+    ///
+    /// ```
+    /// # use stereology_shape::{ClosedMesh, TriangleMesh};
+    /// let bent = ClosedMesh::try_from(TriangleMesh::cubes(&[[0, 0, 0], [1, 0, 0], [0, 1, 0]]))?;
+    /// assert!((bent.volume() - 3.0).abs() < 1e-12 && (bent.surface_area() - 14.0).abs() < 1e-12);
+    /// # Ok::<(), stereology_shape::MeshError>(())
+    /// ```
+    #[must_use]
+    pub fn cubes(places: &[[i32; 3]]) -> Self {
+        let mut mesh = Self {
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+        };
+        for place in places {
+            for axis in 0..3 {
+                for (side, beside) in [(0, -1), (1, 1)] {
+                    let mut next = *place;
+                    next[axis] += beside;
+                    if !places.contains(&next) {
+                        mesh.push_face(place.map(f64::from), axis, side);
+                    }
+                }
+            }
+        }
+        mesh.weld();
+        mesh
+    }
+
+    /// Adds the face of the unit cube at `corner` whose normal is along `axis`, negative for side 0, positive for 1.
+    fn push_face(&mut self, corner: [f64; 3], axis: usize, side: u8) {
+        let first = index(self.vertices.len());
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+            let mut vertex = corner;
+            vertex[axis] += f64::from(side);
+            vertex[(axis + 1) % 3] += u;
+            vertex[(axis + 2) % 3] += v;
+            self.vertices.push(vertex.into());
+        }
+        let corners = if side == 1 { [[1, 2], [2, 3]] } else { [[2, 1], [3, 2]] };
+        self.triangles
+            .extend(corners.map(|[p, q]| [first, first + p, first + q]));
+    }
+
     /// Upright cylinder along z: a prism of `sides` (at least 3) sides whose cross-section has the **area of the
     /// circle** of `diameter`, so its volume is the cylinder's. `4 sides - 4` triangles.
     ///

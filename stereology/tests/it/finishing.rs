@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::exemplar::SolidError;
@@ -14,23 +14,13 @@ fn go(_: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Grains of three greys.
+/// Square grains of three greys, 6 pixels wide.
 fn stone(side: usize) -> Array3<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let grains: Vec<[f64; 3]> = (0..side * side / 30)
-        .map(|_| [0; 3].map(|_| rng.random::<f64>()))
-        .collect();
+    let greys = Array2::from_shape_fn([side.div_ceil(6); 2], |_| rng.random_range(0..3_u8));
     Array3::from_shape_fn((side, side, 1), |(y, x, _)| {
-        let (y, x) = (y as f64 / side as f64, x as f64 / side as f64);
-        let near = grains
-            .iter()
-            .min_by(|a, b| (a[0] - y).hypot(a[1] - x).total_cmp(&(b[0] - y).hypot(b[1] - x)));
-        ((near.unwrap()[2] * 3.0) as u8 * 100 + 20) as f32
+        f32::from(greys[[y / 6, x / 6]]) * 100.0 + 20.0
     })
-}
-
-fn grown(mask: &Array3<bool>, measured: &[([usize; 3], Vec<f32>)], options: &GrowOptions) -> Grown {
-    grow(mask.view(), stone(64).view(), measured, options, &go).unwrap()
 }
 
 /// The finishing pass removes the seams of cells; measurements and voxels outside the mask keep their values, and all
@@ -41,7 +31,8 @@ fn finishing_removes_seams() {
     let measured: Vec<_> = (0..8)
         .map(|i| ([2 + i, 20 - 2 * i, (7 * i) % 20], vec![(31 * i) as f32 + 0.5]))
         .collect();
-    let made = grown(&mask, &measured, &GrowOptions::default().with_window(3));
+    let options = GrowOptions::default().with_window(3);
+    let made = grow(mask.view(), stone(64).view(), &measured, &options, &go).unwrap();
     let finished = finish_grown(&made, mask.view(), stone(64).view(), &measured, 5, 0, &go).unwrap();
     let visible = |made: &Grown| seams(made.values.view(), made.labels.view()).visibility().unwrap();
     let (before, after) = (visible(&made), visible(&finished));

@@ -69,7 +69,7 @@ pub fn draw(folder: &Path) -> Result<()> {
     )?;
     let hollow = [
         TriangleMesh::torus(2.0, 0.7, 32, 16),
-        bars(&[
+        TriangleMesh::cubes(&[
             [0, 0, 0],
             [1, 0, 0],
             [2, 0, 0],
@@ -78,7 +78,7 @@ pub fn draw(folder: &Path) -> Result<()> {
             [0, 2, 0],
             [2, 2, 0],
         ]),
-        bars(&[
+        TriangleMesh::cubes(&[
             [2, 2, 2],
             [0, 2, 2],
             [1, 2, 2],
@@ -227,36 +227,4 @@ fn lines(path: &Path, curves: &[(&str, RadialDistribution, RGBColor)]) -> Result
         Ok(())
     };
     drawing().map_err(|error| anyhow!("{}: {error}", path.display()))
-}
-
-/// The surface of unit cubes that share faces.
-fn bars(cubes: &[[i32; 3]]) -> TriangleMesh {
-    let mut mesh = TriangleMesh {
-        vertices: Vec::new(),
-        triangles: Vec::new(),
-    };
-    for cube in cubes {
-        for axis in 0..3 {
-            for (side, beside) in [(0, -1), (1, 1)] {
-                let mut next = *cube;
-                next[axis] += beside;
-                if cubes.contains(&next) {
-                    continue;
-                }
-                let first = mesh.vertices.len() as u32;
-                for (u, v) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
-                    let mut corner = cube.map(f64::from);
-                    corner[axis] += f64::from(side);
-                    corner[(axis + 1) % 3] += f64::from(u);
-                    corner[(axis + 2) % 3] += f64::from(v);
-                    mesh.vertices.push(corner.into());
-                }
-                let corners = if side == 1 { [[1, 2], [2, 3]] } else { [[2, 1], [3, 2]] };
-                mesh.triangles
-                    .extend(corners.map(|[p, q]| [first, first + p, first + q]));
-            }
-        }
-    }
-    mesh.weld();
-    mesh
 }

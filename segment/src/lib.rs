@@ -69,6 +69,7 @@ pub use ground::tones::{TwoTones, main_colours};
 pub use labels::category::{Category, categorise, size_by_category};
 pub use labels::outline::{Outline, Ring, fill_outlines, outlines};
 pub use labels::profile::{Profile, Window};
+pub use labels::profile_shape::ProfileShape;
 pub use labels::split::{contrast_depth, split_by_colour, split_by_depth, split_by_shape};
 pub use labels::watershed::{h_maxima, watershed};
 pub use options::{BinderChoice, CategoryCount, Holes, SegmentOptions};

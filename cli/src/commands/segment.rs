@@ -25,8 +25,10 @@ use stereology_report::{percent, significant};
 /// with --labels.
 ///
 /// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge,
-/// weight; colours 0 to 255), overlay.png (look at this first), binder.png, means.png, residual.tif (f32, photo / 255 -
-/// means, exact), residual.png (for viewing) and summary.json.
+/// weight, left, top, right, bottom, pixels, axis_ratio, ellipticity, solidity, orientation; colours 0 to 255,
+/// orientation in degrees from the rows towards larger y; the last four are empty below 50 pixels), overlay.png (look
+/// at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing) and
+/// summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
 pub struct Segment {

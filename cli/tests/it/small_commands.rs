@@ -294,7 +294,13 @@ fn a_photograph_of_discs() {
         ]
     );
     let table = fs::read_to_string(format!("{out}/profiles.csv")).unwrap();
-    assert!(table.starts_with("id,x,y,area,size,r,g,b,category,touches_edge,weight\n") && table.lines().count() == 81);
+    assert!(table.starts_with("id,x,y,area,size,r,g,b,category,touches_edge,weight,left,top,right,bottom,pixels,axis_ratio,ellipticity,solidity,orientation\n"));
+    assert_eq!(table.lines().count(), 81);
+    // Discs are ellipses.
+    for row in table.lines().skip(1) {
+        let ellipticity: f64 = row.split(',').nth(17).unwrap().parse().unwrap();
+        assert!((ellipticity - 1.0).abs() < 0.02, "{row}");
+    }
 
     // Its own label map, imported again, gives the same profiles; its table can be unfolded.
     let again = path(&folder, "again");

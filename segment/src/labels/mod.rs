@@ -6,5 +6,6 @@ pub(crate) mod flecks;
 pub(crate) mod import;
 pub(crate) mod outline;
 pub(crate) mod profile;
+pub(crate) mod profile_shape;
 pub(crate) mod split;
 pub(crate) mod watershed;

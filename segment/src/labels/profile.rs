@@ -4,6 +4,8 @@ use image::RgbImage;
 use ndarray::Array2;
 use stereology_metrics::{BoundingBox, EdgeRule, SamplingWindow};
 
+use crate::labels::profile_shape::{ProfileShape, ShapeSums};
+
 /// The section of one particle. Lengths in pixels, colours sRGB / 255.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
@@ -27,6 +29,10 @@ pub struct Profile {
     pub weight: f64,
     /// Left, upper, right, lower edge, pixels.
     pub bounding_box: [usize; 4],
+    /// Number of pixels.
+    pub pixels: u64,
+    /// Axis ratio, ellipticity, solidity and orientation; `None` below 50 pixels and of pixels on one line.
+    pub shape: Option<ProfileShape>,
 }
 
 /// Where profiles are counted.
@@ -45,14 +51,12 @@ pub struct Window {
 pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -> Vec<Profile> {
     #[derive(Clone)]
     struct Sums {
-        count: u64,
-        place: [u64; 2],
+        shape: ShapeSums,
         colour: [u64; 3],
         bounds: [usize; 4],
     }
     let empty = Sums {
-        count: 0,
-        place: [0; 2],
+        shape: ShapeSums::default(),
         colour: [0; 3],
         bounds: [usize::MAX, usize::MAX, 0, 0],
     };
@@ -64,9 +68,7 @@ pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -
             continue;
         }
         let s = &mut sums[index.of(label)];
-        s.count += 1;
-        s.place[0] += x as u64;
-        s.place[1] += y as u64;
+        s.shape.add(x, y);
         (0..3).for_each(|c| s.colour[c] += u64::from(pixel[c]));
         s.bounds = [
             s.bounds[0].min(x),
@@ -78,13 +80,14 @@ pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -
     let (height, width) = labels.dim();
     ids.into_iter()
         .zip(sums)
-        .filter(|(_, s)| s.count >= min_area as u64)
+        .filter(|(_, s)| s.shape.count() >= min_area as u64)
         .map(|(id, s)| {
-            let area = s.count as f64;
+            let area = s.shape.count() as f64;
+            let [x, y] = s.shape.centre();
             Profile {
                 id,
-                x: s.place[0] as f64 / area + 0.5,
-                y: s.place[1] as f64 / area + 0.5,
+                x,
+                y,
                 area,
                 size: size_of_area(area),
                 colour: s.colour.map(|c| c as f64 / (255.0 * area)),
@@ -92,6 +95,8 @@ pub(crate) fn measure(photo: &RgbImage, labels: &Array2<u32>, min_area: usize) -
                 touches_edge: s.bounds[0] == 0 || s.bounds[1] == 0 || s.bounds[2] == width || s.bounds[3] == height,
                 weight: 1.0,
                 bounding_box: s.bounds,
+                pixels: s.shape.count(),
+                shape: s.shape.shape(),
             }
         })
         .collect()

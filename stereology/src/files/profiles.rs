@@ -10,6 +10,9 @@ use stereology_grid::write_atomically;
 use stereology_segment::Segmentation;
 use stereology_unfold::BoundingBox;
 
+/// Columns of the table of a segmentation.
+const HEADER: &str = "id,x,y,area,size,r,g,b,category,touches_edge,weight,left,top,right,bottom,pixels,axis_ratio,ellipticity,solidity,orientation";
+
 /// Writes the profiles of a segmentation, with lengths multiplied by `scale`, completely or not at all.
 ///
 /// # Errors
@@ -17,10 +20,10 @@ use stereology_unfold::BoundingBox;
 /// [`FileError`] if it cannot be written.
 pub fn write(path: impl AsRef<Path>, segmentation: &Segmentation, scale: f64) -> Result<(), FileError> {
     Ok(write_atomically(path, |out| {
-        writeln!(out, "id,x,y,area,size,r,g,b,category,touches_edge,weight")?;
+        writeln!(out, "{HEADER}")?;
         segmentation.profiles.iter().try_for_each(|p| {
             let [r, g, b] = p.colour.map(|c| 255.0 * c);
-            writeln!(
+            write!(
                 out,
                 "{},{},{},{},{},{r},{g},{b},{},{},{}",
                 p.id,
@@ -31,7 +34,17 @@ pub fn write(path: impl AsRef<Path>, segmentation: &Segmentation, scale: f64) ->
                 p.category,
                 u8::from(p.touches_edge),
                 p.weight
-            )
+            )?;
+            let [left, top, right, bottom] = p.bounding_box.map(|side| side as f64 * scale);
+            write!(out, ",{left},{top},{right},{bottom},{}", p.pixels)?;
+            match p.shape {
+                None => writeln!(out, ",,,,"),
+                Some(of) => writeln!(
+                    out,
+                    ",{},{},{},{}",
+                    of.axis_ratio, of.ellipticity, of.solidity, of.orientation
+                ),
+            }
         })
     })?)
 }

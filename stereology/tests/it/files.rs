@@ -130,6 +130,8 @@ proptest! {
         for (row, profile) in read.iter().zip(&found.profiles) {
             prop_assert_eq!((row.size, row.weight), (profile.size * scale, profile.weight));
             prop_assert_eq!((row.category, row.touches_edge), (Some(profile.category), Some(profile.touches_edge)));
+            let sides = row.bounding_box.map(|b| [b.left, b.top, b.right, b.bottom]);
+            prop_assert_eq!(sides, Some(profile.bounding_box.map(|side| side as f64 * scale)));
         }
     }
 

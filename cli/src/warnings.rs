@@ -17,6 +17,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Look at overlay.png; give the colour of the binder with --binder, or import a label map with --labels FILE.",
     ),
     (
+        "beyond-heeger-bergen",
+        "The image has structures (edges, chips, layers, two phases) that the synthesis of sub-bands does not reproduce: slices of the result are distinguishable from it.",
+        "Use `stereology exemplar`, which copies pixels; for layers or fibres, --mode oriented with one image per axis.",
+    ),
+    (
         "box-rounded",
         "The box's side was rounded to a whole number of periods of the texture, so that the solid repeats.",
         "Nothing, unless you need exactly that side; then give --box as a multiple of the texture's period.",

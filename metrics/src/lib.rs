@@ -9,8 +9,11 @@
 //! | Do several groups have the same distribution? | [`kruskal_wallis`] | `ranks` |
 //! | How well do found labels match the true ones? | [`label_scores`] | `images` |
 //! | How are the points of a phase arranged? | [`two_point`], [`lineal_path`], [`chord_lengths`], [`local_porosity`] | `images` |
+//! | How much surface, and how many components and holes, has a phase? | [`planar_functionals`], [`spatial_functionals`] | `images` |
 //! | What texture does an image have? | [`moments`], [`mean_gradient`], [`orientation_field`], [`fringes`], [`sliced_wasserstein`] | `images` |
 //! | How similar are the slices of a solid to an exemplar? | [`compare`] | `images` |
+//! | Are blocks of its slices distinguishable from blocks of the exemplar? | [`block_test`], [`classifier_test`] | `images` |
+//! | How did a figure turn out? | [`Level`] | |
 //! | Where does a synthesised solid come from? | [`copying`], [`seams`] | `images` |
 //!
 //! Every crate of the project describes remarks on its result as [`Finding`]s, accepts a [`Progress`] callback for long
@@ -40,10 +43,13 @@
 mod edge_rule;
 mod edges;
 mod finding;
+mod level;
 mod progress;
 mod wasserstein;
 
 pub use edge_rule::{BoundingBox, EdgeRule, EdgeWeights, SamplingWindow};
+#[cfg(feature = "images")]
+mod blocks;
 #[cfg(feature = "images")]
 mod comparison;
 #[cfg(feature = "images")]
@@ -62,6 +68,8 @@ mod slices;
 mod texture;
 
 #[cfg(feature = "images")]
+pub use blocks::{BlockSource, BlockTest, ClassifierTest, FeatureMeans, block_test, classifier_test};
+#[cfg(feature = "images")]
 pub use comparison::{
     Comparison, Curves, Figure, FringeBand, FringeFilter, MeasureError, MeasureOptions, check_images, compare,
 };
@@ -73,8 +81,12 @@ pub use finding::Finding;
 pub use kruskal_wallis::{KruskalWallis, kruskal_wallis};
 #[cfg(feature = "images")]
 pub use label_scores::{LabelMapsDiffer, LabelScores, label_scores};
+pub use level::Level;
 #[cfg(feature = "images")]
-pub use phase::{chord_lengths, lineal_path, local_porosity, radial_mean, two_point};
+pub use phase::{
+    Chords, PlanarFunctionals, SpatialFunctionals, chord_lengths, lineal_path, local_porosity, planar_functionals,
+    radial_mean, spatial_functionals, two_point,
+};
 pub use progress::Progress;
 #[cfg(feature = "images")]
 pub use seams::{Seams, seams};

@@ -98,6 +98,9 @@ impl Steps<'_> {
     }
 }
 
+/// Mean square of one grey level of 8 bits.
+const INVISIBLE: f64 = 1.0 / (255.0 * 255.0);
+
 /// Error of the bands of cuts.
 struct Convergence {
     cuts: Cuts,
@@ -129,7 +132,9 @@ impl Convergence {
         }
     }
 
-    /// Root mean square of ln(variance / that of the exemplar) over cuts and bands, in the first component.
+    /// Root mean square of ln(variance / that of the exemplar) over cuts and bands, in the first component. One grey
+    /// level of 8 bits is added to both, so that a band that is not visible, such as the rounding noise of a smooth
+    /// exemplar, is no error.
     fn error(&mut self, canvas: &Canvas<'_>, setup: &Setup<'_>) -> f64 {
         let Some(&first) = setup.varying.first() else {
             return 0.0;
@@ -140,7 +145,7 @@ impl Convergence {
             let wanted = &self.wanted[if n < 3 { n } else { 0 }][0];
             let bands = found[..found.len() - 1].iter().zip(wanted);
             for (f, w) in bands.filter(|(f, w)| **f > 0.0 && **w > 0.0) {
-                sum += (f / w).ln().powi(2);
+                sum += ((f + INVISIBLE) / (w + INVISIBLE)).ln().powi(2);
                 count += 1.0;
             }
         }

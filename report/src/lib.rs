@@ -27,7 +27,7 @@ pub use figures::{
     SynthesisReport,
 };
 pub use gallery::{Candidate, Displacement, Gallery, Histogram};
-pub use measures::MeasureReport;
+pub use measures::{MeasureReport, PhaseRow};
 pub use number::{counted, percent, significant};
 pub use of_synthesis::{Invocation, SolidImages};
 pub use page::synthesis_page;

@@ -2,10 +2,12 @@
 
 use askama::Template;
 use image::RgbImage;
-use stereology::metrics::{Comparison, Figure};
+use stereology::metrics::{BlockTest, Comparison, FeatureMeans, Figure};
+use stereology::pipeline::Level;
 
+use crate::checks;
 use crate::number::significant;
-use crate::page::{Captioned, Picture};
+use crate::page::{Captioned, Picture, class};
 use crate::plot::{self, Plot};
 
 /// Content of the page.
@@ -23,14 +25,29 @@ pub struct MeasureReport<'a> {
     pub number: usize,
     /// The comparison.
     pub comparison: &'a Comparison,
+    /// The block test, if there were enough blocks.
+    pub blocks: Option<&'a BlockTest>,
+    /// Geometry of the phases.
+    pub phases: Vec<PhaseRow>,
     /// The command that repeats the computation.
     pub command: String,
     /// Every parameter with its value.
     pub parameters: Vec<(String, String)>,
 }
 
+/// One quantity of a phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseRow {
+    /// The phase: bright or dark.
+    pub phase: &'static str,
+    /// The quantity.
+    pub quantity: &'static str,
+    /// On the exemplar's image or slices, on the measured slices, in the exemplar's volume, in the volume.
+    pub values: [Option<f64>; 4],
+}
+
 /// Title and meaning of each measure, in the order of [`Comparison::figures`].
-const MEANINGS: [(&str, &str); 15] = [
+const MEANINGS: [(&str, &str); 23] = [
     (
         "Grey levels",
         "Kullback-Leibler divergence of the histograms of 64 bins, nats",
@@ -61,6 +78,32 @@ const MEANINGS: [(&str, &str); 15] = [
         "Sharpness",
         "mean gradient over that of the exemplar: below 1 is blur, above 1 noise or seams",
     ),
+    ("Patches of 31 pixels", "sliced Wasserstein distance"),
+    (
+        "Amplitudes across scales",
+        "difference of their correlations at neighbouring scales: edges and flat areas at the same places",
+    ),
+    (
+        "Phases across scales",
+        "difference of their correlations at neighbouring scales: sharp edges and lines",
+    ),
+    (
+        "Boundary",
+        "length of the boundary between the phases over that of the exemplar",
+    ),
+    (
+        "Euler number",
+        "of the bright phase per 10,000 pixels: components minus holes",
+    ),
+    ("Dark chords", "mean chord of the dark phase over that of the exemplar"),
+    (
+        "Variation of chords",
+        "of the bright phase: standard deviation over mean",
+    ),
+    (
+        "Variation of dark chords",
+        "of the dark phase: standard deviation over mean",
+    ),
 ];
 
 #[derive(Template)]
@@ -70,10 +113,26 @@ struct MeasuresPage<'a> {
     volume: &'a str,
     number: usize,
     pictures: Vec<Captioned>,
+    verdict: Statement,
+    blocks: Option<Blocks>,
     rows: Vec<Row>,
+    phases: Vec<(String, [String; 4])>,
     curves: Vec<Curve>,
     command: &'a str,
     parameters: &'a [(String, String)],
+}
+
+/// A level with its sentence.
+struct Statement {
+    class: &'static str,
+    text: String,
+}
+
+/// The block test.
+struct Blocks {
+    accuracy: String,
+    statement: Statement,
+    features: Vec<(String, [String; 3])>,
 }
 
 struct Row {
@@ -83,6 +142,7 @@ struct Row {
     ideal: String,
     floor: String,
     in_floors: String,
+    level: &'static str,
     class: &'static str,
 }
 
@@ -109,7 +169,10 @@ impl MeasureReport<'_> {
             volume: &self.volume_name,
             number: self.number,
             pictures: exemplar.chain(slices).collect(),
+            verdict: verdict(self.comparison, self.blocks),
+            blocks: self.blocks.map(blocks),
             rows: rows(self.comparison),
+            phases: self.phases.iter().map(phase).collect(),
             curves: curves(self.comparison),
             command: &self.command,
             parameters: &self.parameters,
@@ -132,15 +195,68 @@ fn rows(found: &Comparison) -> Vec<Row> {
                 ideal: shown(ideal),
                 floor: shown(floor),
                 in_floors: shown(in_floors),
-                class: match in_floors {
-                    Some(floors) if floors <= 1.0 => "good",
-                    Some(floors) if floors <= 2.0 => "fair",
-                    Some(_) => "poor",
-                    None => "soft",
-                },
+                level: figure.level().map_or("", checks::word),
+                class: figure.level().map_or("soft", class),
             }
         })
         .collect()
+}
+
+/// The verdict in a sentence.
+fn verdict(found: &Comparison, test: Option<&BlockTest>) -> Statement {
+    let titles = found.figures().into_iter().zip(MEANINGS);
+    let of = |level: Level| -> Vec<&str> {
+        let is_level = |((_, figure), _): &((&str, Figure), (&str, &str))| figure.level() == Some(level);
+        titles.clone().filter(is_level).map(|(_, (title, _))| title).collect()
+    };
+    let (bad, care) = (of(Level::Bad), of(Level::Care));
+    let of_figures = found.verdict().map(|(level, _)| level);
+    let level = of_figures.into_iter().chain(test.map(BlockTest::level)).max();
+    let listed = |what: &str, names: &[&str]| match names {
+        [] => String::new(),
+        names => format!(" {what}: {}.", names.join(", ").to_lowercase()),
+    };
+    let summary = match level {
+        Some(Level::Good) => "The slices cannot be distinguished from the exemplar.",
+        Some(Level::Care) => "The slices differ from the exemplar in some respect.",
+        Some(Level::Bad) => "The slices do not look like the exemplar.",
+        None => "Nothing could be judged: the exemplar has no floor.",
+    };
+    Statement {
+        class: level.map_or("soft", class),
+        text: format!("{summary}{}{}", listed("Bad", &bad), listed("With care", &care)),
+    }
+}
+
+fn blocks(test: &BlockTest) -> Blocks {
+    let meaning = match test.level() {
+        Level::Good => "no better than chance would allow",
+        Level::Care => "more than chance allows, but most features agree",
+        Level::Bad => "a reader would see the difference",
+    };
+    let feature = |of: &FeatureMeans| {
+        let values = [of.exemplar, of.solid, of.difference].map(significant);
+        (of.name.replace('_', " "), values)
+    };
+    Blocks {
+        accuracy: format!("{:.0} %", 100.0 * test.accuracy),
+        statement: Statement {
+            class: class(test.level()),
+            text: format!(
+                "A classifier finds the side of {:.0} % of {} blocks of {} pixels, p = {}: {meaning}.",
+                100.0 * test.accuracy,
+                2 * test.blocks,
+                test.side,
+                significant(test.p_value)
+            ),
+        },
+        features: test.features.iter().take(6).map(feature).collect(),
+    }
+}
+
+fn phase(row: &PhaseRow) -> (String, [String; 4]) {
+    let shown = |value: Option<f64>| value.map_or_else(String::new, significant);
+    (format!("{} phase: {}", row.phase, row.quantity), row.values.map(shown))
 }
 
 fn curves(found: &Comparison) -> Vec<Curve> {
@@ -174,7 +290,7 @@ fn curves(found: &Comparison) -> Vec<Curve> {
         significant(f64::from(curves.threshold)),
         curves.cell
     );
-    let plots: [(Plot, String); 12] = [
+    let plots: [(Plot, String); 13] = [
         (grey, "Grey levels.".to_owned()),
         (directions, "Directions from the structure tensor.".to_owned()),
         (
@@ -224,6 +340,15 @@ fn curves(found: &Comparison) -> Vec<Curve> {
                 "fraction",
             ),
             "Chords of the bright phase.".to_owned(),
+        ),
+        (
+            plot::pair(
+                &bins(curves.dark_chords[0].len(), 1.0, 1.0),
+                &curves.dark_chords,
+                "chord (pixels)",
+                "fraction",
+            ),
+            "Chords of the dark phase.".to_owned(),
         ),
         (
             plot::pair(

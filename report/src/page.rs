@@ -191,7 +191,7 @@ pub fn synthesis_page(report: &SynthesisReport) -> Result<String, askama::Error>
     .render()
 }
 
-fn class(level: Level) -> &'static str {
+pub(crate) fn class(level: Level) -> &'static str {
     match level {
         Level::Good => "good",
         Level::Care => "fair",

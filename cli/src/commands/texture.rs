@@ -11,6 +11,7 @@ use ndarray::{Array3, Axis};
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
+use stereology::pipeline::{image_texture_limits, texture_limits};
 use stereology::pyramid::{
     self, Exemplar, TextureOptions, TextureReport, synthesize_image_with_report, synthesize_oriented_volume,
     synthesize_volume_with_report,
@@ -18,6 +19,7 @@ use stereology::pyramid::{
 use stereology::segment::read_photo;
 
 use crate::answer::{Answer, Fields, Notes};
+use crate::commands::measure::ClassifierFields;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_file;
@@ -196,6 +198,9 @@ pub struct TextureFields {
     settled: bool,
     /// Error of the statistics of the sections of the result.
     final_error: f64,
+    /// Whether a classifier distinguishes blocks of the slices from blocks of the image; null with fewer
+    /// than 8 blocks of 16 pixels on a side.
+    classifier: Option<ClassifierFields>,
     /// Error of the sub-band statistics before each iteration.
     band_errors: Vec<f64>,
     /// Error of the statistics of the sections after each iteration; empty for images.
@@ -242,12 +247,13 @@ impl Texture {
             }
             step.at(done)
         };
-        let (shape, report) = match target {
+        let (shape, report, limits) = match target {
             Target::Picture(size) => {
                 let (made, report) = synthesize_image_with_report(&exemplars[0], size, &options, &watch).at(path)?;
                 go_on()?;
                 write_picture(&self.output, &made)?;
-                (made.shape().to_vec(), report)
+                let limits = image_texture_limits(samples[0].view(), made.view(), everywhere.seed);
+                (made.shape().to_vec(), report, limits)
             }
             Target::Volume(size, format) => {
                 let (made, report) = if several {
@@ -273,7 +279,9 @@ impl Texture {
                     },
                 )
                 .at(&self.output)?;
-                (made.shape().to_vec(), report)
+                let views: Vec<_> = samples.iter().map(|samples| samples.view()).collect();
+                let limits = texture_limits(&views, made.view(), report.final_error, everywhere.seed);
+                (made.shape().to_vec(), report, limits)
             }
         };
         let mut notes = Notes::default();
@@ -308,6 +316,18 @@ impl Texture {
         for finding in &report.findings {
             notes.warn(Warning::new(finding.code, finding.message.clone()));
         }
+        if let Some(test) = &limits.blocks {
+            notes.line(format!(
+                "classifier: {:.0} % of {} blocks of {} pixels are distinguished from the image's, p {:.3}",
+                100.0 * test.accuracy,
+                2 * test.blocks,
+                test.side,
+                test.p_value
+            ));
+        }
+        if let Some(finding) = limits.finding {
+            notes.warn(finding);
+        }
         let fields = TextureFields {
             shape,
             mode: mode.name(),
@@ -316,6 +336,7 @@ impl Texture {
             orientations: self.choices.orientations,
             settled: report.has_settled(),
             final_error: report.final_error,
+            classifier: limits.blocks.as_ref().map(ClassifierFields::of),
             band_errors: report.band_errors,
             slice_errors: report.slice_errors,
         };

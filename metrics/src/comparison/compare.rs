@@ -10,11 +10,14 @@ use super::options::{FringeBand, MeasureOptions};
 use super::statistics::{POROSITY_BINS, Settings, Statistics};
 use crate::phase::radial_mean;
 use crate::progress::Progress;
-use crate::texture::{grey, histogram, kl_divergence, sliced_wasserstein};
+use crate::texture::{CrossScale, PAIRS, grey, histogram, kl_divergence, sliced_wasserstein};
 use crate::wasserstein::wasserstein_sorted;
 
 /// Pixels that an exemplar needs along each axis so that its halves can be measured; half as many suffice for slices.
 const LEAST: usize = 16;
+
+/// Ways to cut the exemplar into halves: left and right, upper and lower, opposite quarters.
+const CUTS: u8 = 3;
 
 /// Compares the slices of a solid with an exemplar, values 0 to 1, axes (row, column, channel). The exemplar may be
 /// several images, such as the slices of a real volume.
@@ -75,9 +78,9 @@ pub fn compare(
     let mut found = figures(&of_exemplar, &of_slices, options);
     report(0.7)?;
     let mut halves = Vec::new();
-    for cut in 0..2_u8 {
+    for cut in 0..CUTS {
         halves.push(halves_compared(&exemplar, cut, &settings, options)?);
-        report(0.85 + 0.15 * f64::from(cut))?;
+        report(0.7 + 0.1 * f64::from(cut + 1))?;
     }
     set_floors(&mut found, &halves);
     found.curves = curves(&of_exemplar, &of_slices, &settings);
@@ -158,22 +161,22 @@ fn settings<'a>(
     }
 }
 
-/// The figures of one half of the exemplar beside the other: left and right halves (cut 0) or upper and lower ones (cut
-/// 1).
+/// The figures of one half of the exemplar beside the other: left and right halves (cut 0), upper and lower ones (cut
+/// 1), or both pairs of opposite quarters (cut 2), whose differences are independent if the quarters are.
 fn halves_compared(
     exemplar: &[ArrayView3<'_, f32>],
     cut: u8,
     settings: &Settings<'_>,
     options: &MeasureOptions,
 ) -> Result<Comparison, MeasureError> {
-    let axis = Axis(usize::from(1 - cut));
     let half = |part: u8| -> Result<Statistics, MeasureError> {
         let parts: Vec<ArrayView3<'_, f32>> = exemplar
             .iter()
-            .map(|image| {
-                let n = image.len_of(axis) / 2;
-                let from = usize::from(part) * n;
-                image.slice_axis(axis, (from..from + n).into())
+            .flat_map(|image| match cut {
+                0 | 1 => vec![half_of(*image, Axis(usize::from(1 - cut)), part)],
+                _ => [0, 1]
+                    .map(|lower| half_of(half_of(*image, Axis(0), lower), Axis(1), lower ^ part))
+                    .to_vec(),
             })
             .collect();
         let stream = 2 + 2 * u64::from(cut) + u64::from(part);
@@ -182,7 +185,15 @@ fn halves_compared(
     Ok(figures(&half(0)?, &half(1)?, options))
 }
 
-/// Sets the floor of each figure: the mean distance from the ideal of the halves of the exemplar.
+/// The first (0) or second half (1) of an image along an axis.
+fn half_of(image: ArrayView3<'_, f32>, axis: Axis, part: u8) -> ArrayView3<'_, f32> {
+    let n = image.len_of(axis) / 2;
+    let from = usize::from(part) * n;
+    image.slice_axis_move(axis, (from..from + n).into())
+}
+
+/// Sets the floor of each figure: the mean distance from the ideal of the halves of the exemplar, over all ways to cut
+/// it.
 fn set_floors(found: &mut Comparison, halves: &[Comparison]) {
     let distances: Vec<Vec<Option<f64>>> = halves
         .iter()
@@ -222,6 +233,13 @@ fn figures(exemplar: &Statistics, solid: &Statistics, options: &MeasureOptions) 
         .map(f64::sqrt);
     let pairs = |k: usize| exemplar.lineal_path[k].iter().zip(&solid.lineal_path[k]);
     let path = (0..2).flat_map(pairs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let difference = |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>()).sqrt();
+    let scales = exemplar.scales.as_ref().zip(solid.scales.as_ref());
+    let per_pair = (PAIRS as f64).sqrt();
+    let magnitudes = scales.map(|(a, b)| difference(&a.magnitudes(), &b.magnitudes()) / per_pair);
+    let phases = scales.map(|(a, b)| difference(a.phases().as_flattened(), b.phases().as_flattened()) / per_pair);
+    let mean = |of: &Statistics, phase: usize| of.chords(phase).map(|chords| chords.mean);
+    let variation = |of: &Statistics, phase: usize| of.chords(phase).map(|chords| chords.variation);
     let swd = |k: usize| {
         sliced_wasserstein(
             &exemplar.patches[k],
@@ -244,11 +262,19 @@ fn figures(exemplar: &Statistics, solid: &Statistics, options: &MeasureOptions) 
         tortuosity: level(solid.fringes.mean_tortuosity(), exemplar.fringes.mean_tortuosity()),
         s2: distance(s2),
         lineal_path: distance(Some(path)),
-        chord_ratio: ratio(solid.mean_chord(), exemplar.mean_chord()),
+        chord_ratio: ratio(mean(solid, 0), mean(exemplar, 0)),
         local_porosity: distance(Some(wasserstein_sorted(&exemplar.porosities, &solid.porosities))),
         swd7: distance(swd(0)),
         swd16: distance(swd(1)),
         gradient_ratio: ratio(Some(solid.gradient), Some(exemplar.gradient)),
+        swd31: distance(swd(2)),
+        scale_magnitudes: distance(magnitudes),
+        scale_phases: distance(phases),
+        boundary_ratio: ratio(Some(solid.boundary), Some(exemplar.boundary)),
+        euler: level(Some(1e4 * solid.euler), Some(1e4 * exemplar.euler)),
+        dark_chord_ratio: ratio(mean(solid, 1), mean(exemplar, 1)),
+        chord_variation: level(variation(solid, 0), variation(exemplar, 0)),
+        dark_chord_variation: level(variation(solid, 1), variation(exemplar, 1)),
         curves: Curves::default(),
     }
 }
@@ -273,12 +299,14 @@ fn curves(exemplar: &Statistics, solid: &Statistics, settings: &Settings<'_>) ->
                 .map(|(a, b)| (a + b) / 2.0)
                 .collect()
         }),
-        chords: both(&|s| {
-            let mut fractions = vec![0.0; 2 * r];
-            for &chord in s.chords.iter().filter(|&&chord| chord <= 2 * r) {
-                fractions[chord - 1] += 1.0 / s.chords.len() as f64;
-            }
-            fractions
+        chords: both(&|s| fractions(&s.chords[0], 2 * r)),
+        dark_chords: both(&|s| fractions(&s.chords[1], 2 * r)),
+        scale_magnitudes: both(&|s| s.scales.iter().flat_map(CrossScale::magnitudes).collect()),
+        scale_phases: both(&|s| {
+            s.scales
+                .iter()
+                .flat_map(|of| of.phases().as_flattened().to_vec())
+                .collect()
         }),
         local_porosity: both(&|s| histogram(s.porosities.iter().copied(), POROSITY_BINS)),
         fringe_lengths: both(&|s| sorted(s.fringes.lengths.clone())),
@@ -291,4 +319,13 @@ fn curves(exemplar: &Statistics, solid: &Statistics, settings: &Settings<'_>) ->
         direction: settings.band.and_then(|band| band.direction),
         window: settings.window,
     }
+}
+
+/// Fractions of chords of 1 to `longest` pixels.
+fn fractions(chords: &[usize], longest: usize) -> Vec<f64> {
+    let mut fractions = vec![0.0; longest];
+    for &chord in chords.iter().filter(|&&chord| chord <= longest) {
+        fractions[chord - 1] += 1.0 / chords.len() as f64;
+    }
+    fractions
 }

@@ -5,8 +5,11 @@ use rayon::prelude::*;
 
 use super::error::MeasureError;
 use super::options::FringeBand;
-use crate::phase::{chord_lengths, lineal_path, local_porosity, two_point};
-use crate::texture::{Fringes, Moments, Patches, fringes, grey, histogram, mean_gradient, moments, orientation_field};
+use crate::phase::{Chords, chord_lengths, lineal_path, local_porosity, planar_functionals, two_point};
+use crate::texture::{
+    CrossScale, Fringes, LEAST_SIDE, Moments, MonogenicBand, PAIRS, Patches, fringes, grey, histogram, mean_gradient,
+    moments, monogenic_bands, orientation_field,
+};
 
 /// Settings that must be the same for all images that are compared.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +28,14 @@ pub(super) struct Settings<'a> {
 pub(super) const GREY_BINS: usize = 64;
 pub(super) const ORIENTATION_BINS: usize = 36;
 pub(super) const POROSITY_BINS: usize = 20;
+/// Sides of the patches of the sliced Wasserstein distance, pixels.
+const PATCHES: [usize; 3] = [7, 16, 31];
+/// Largest side of the patches of which all are drawn; of larger ones fewer, so that they have as many samples.
+const WHOLE_DRAW: usize = 16;
+/// Images of which scales are compared at most: neighbouring slices are almost equal.
+const SCALE_IMAGES: usize = 32;
+/// Largest part in pixels of an image of which scales are compared.
+const SCALE_SIDE: usize = 512;
 
 /// Statistics of a set of images.
 #[derive(Debug)]
@@ -38,10 +49,16 @@ pub(super) struct Statistics {
     pub two_point: Array2<f64>,
     /// Along rows, along columns.
     pub lineal_path: [Vec<f64>; 2],
-    pub chords: Vec<usize>,
+    /// Of the bright and the dark phase.
+    pub chords: [Vec<usize>; 2],
+    /// Length of the boundary per area, mean Euler number of both connectivities per area.
+    pub boundary: f64,
+    pub euler: f64,
     /// Sorted.
     pub porosities: Vec<f32>,
-    pub patches: [Patches; 2],
+    pub patches: [Patches; 3],
+    /// `None` if all images are too small.
+    pub scales: Option<CrossScale>,
 }
 
 /// Statistics of one image.
@@ -57,7 +74,9 @@ struct ImageStatistics {
     fringes: Fringes,
     two_point: Array2<f64>,
     lineal_path: [Vec<f64>; 2],
-    chords: Vec<usize>,
+    chords: [Vec<usize>; 2],
+    boundary: f64,
+    euler: f64,
     porosities: Vec<f32>,
 }
 
@@ -100,9 +119,15 @@ impl Statistics {
                 weighted(&|p| &p.lineal_path[0], &|p| p.pixels),
                 weighted(&|p| &p.lineal_path[1], &|p| p.pixels),
             ],
-            chords: each.iter().flat_map(|p| p.chords.iter().copied()).collect(),
+            chords: [0, 1].map(|k| each.iter().flat_map(|p| p.chords[k].iter().copied()).collect()),
+            boundary: mean(&|p| p.boundary),
+            euler: mean(&|p| p.euler),
             porosities,
-            patches: [7, 16].map(|side| Patches::draw(images, side, settings.patches, seed)),
+            patches: PATCHES.map(|side| {
+                let count = settings.patches * WHOLE_DRAW.pow(2) / side.max(WHOLE_DRAW).pow(2);
+                Patches::draw(images, side, count, seed)
+            }),
+            scales: scales(images),
             moments: each.into_iter().map(|p| p.moments).collect(),
         })
     }
@@ -115,10 +140,37 @@ impl Statistics {
         self.moments.iter().map(|m| m.skewness).sum::<f64>() / self.moments.len() as f64
     }
 
-    pub(super) fn mean_chord(&self) -> Option<f64> {
-        let n = self.chords.len();
-        (n > 0).then(|| self.chords.iter().map(|&c| c as f64).sum::<f64>() / n as f64)
+    /// Chords of the bright (0) or the dark phase (1).
+    pub(super) fn chords(&self, phase: usize) -> Option<Chords> {
+        Chords::of(&self.chords[phase])
     }
+}
+
+/// Dependence of neighbouring scales in the middle of evenly spaced images.
+fn scales(images: &[ArrayView3<'_, f32>]) -> Option<CrossScale> {
+    let count = images.len().min(SCALE_IMAGES);
+    let each: Vec<Option<CrossScale>> = (0..count)
+        .into_par_iter()
+        .map(|i| {
+            let image = images[(2 * i + 1) * images.len() / (2 * count)];
+            let middle = [Axis(0), Axis(1)].into_iter().fold(image, |image, axis| {
+                let (n, side) = (image.len_of(axis), image.len_of(axis).min(SCALE_SIDE));
+                let from = (n - side) / 2;
+                image.slice_axis_move(axis, (from..from + side).into())
+            });
+            if middle.dim().0.min(middle.dim().1) < LEAST_SIDE {
+                return None;
+            }
+            let bands = monogenic_bands(&grey(middle), PAIRS + 1);
+            let amplitudes: Vec<Array2<f32>> = bands.iter().map(MonogenicBand::amplitude).collect();
+            Some(CrossScale::of(&bands, &amplitudes))
+        })
+        .collect();
+    // In order, so that the sum does not depend on the number of threads.
+    each.into_iter().flatten().reduce(|mut sum, one| {
+        sum.add(&one);
+        sum
+    })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "porosities in single precision suffice")]
@@ -133,6 +185,14 @@ fn image_statistics(image: &ArrayView3<'_, f32>, settings: &Settings<'_>) -> Res
             found.extend(fringes(&filtered, band.period));
         }
     }
+    let functionals = planar_functionals(phase.view());
+    let dark = phase.map(|bright| !bright);
+    let chords = |phase: &Array2<bool>| {
+        [1, 0]
+            .into_iter()
+            .flat_map(|axis| chord_lengths(phase.view(), Axis(axis)))
+            .collect()
+    };
     let path = |axis| lineal_path(phase.view(), Axis(axis), settings.reach);
     Ok(ImageStatistics {
         grey: histogram(grey.iter().copied(), GREY_BINS),
@@ -145,10 +205,9 @@ fn image_statistics(image: &ArrayView3<'_, f32>, settings: &Settings<'_>) -> Res
         fringes: found,
         two_point: two_point(phase.view(), settings.reach),
         lineal_path: [path(1), path(0)],
-        chords: [1, 0]
-            .into_iter()
-            .flat_map(|axis| chord_lengths(phase.view(), Axis(axis)))
-            .collect(),
+        chords: [chords(&phase), chords(&dark)],
+        boundary: functionals.boundary_length,
+        euler: (functionals.euler_8 + functionals.euler_4) / 2.0,
         porosities: local_porosity(phase.view(), settings.cell)
             .iter()
             .map(|&fraction| fraction as f32)

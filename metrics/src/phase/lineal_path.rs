@@ -64,6 +64,43 @@ pub fn chord_lengths(phase: ArrayView2<'_, bool>, along: Axis) -> Vec<usize> {
         .collect()
 }
 
+/// Number, mean and spread of chords.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chords {
+    /// Number of chords.
+    pub count: usize,
+    /// Mean length, pixels.
+    pub mean: f64,
+    /// Standard deviation over mean: 1 for exponential lengths.
+    pub variation: f64,
+}
+
+impl Chords {
+    /// Of these lengths; `None` if there are none.
+    ///
+    /// ```
+    /// use stereology_metrics::Chords;
+    ///
+    /// let found = Chords::of(&[1, 3]).unwrap();
+    /// assert_eq!((found.mean, found.variation), (2.0, 0.5));
+    /// ```
+    #[must_use]
+    pub fn of(lengths: &[usize]) -> Option<Self> {
+        let n = lengths.len() as f64;
+        let mean = lengths.iter().map(|&length| length as f64).sum::<f64>() / n;
+        let square = lengths
+            .iter()
+            .map(|&length| (length as f64 - mean).powi(2))
+            .sum::<f64>()
+            / n;
+        (!lengths.is_empty()).then(|| Self {
+            count: lengths.len(),
+            mean,
+            variation: square.sqrt() / mean,
+        })
+    }
+}
+
 /// Runs of the phase, and whether both their ends lie inside.
 fn runs(phase: ArrayView2<'_, bool>, along: Axis) -> Vec<(usize, bool)> {
     let mut found = Vec::new();

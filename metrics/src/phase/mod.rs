@@ -2,8 +2,10 @@
 
 mod lineal_path;
 mod local_porosity;
+mod minkowski;
 mod two_point;
 
-pub use lineal_path::{chord_lengths, lineal_path};
+pub use lineal_path::{Chords, chord_lengths, lineal_path};
 pub use local_porosity::local_porosity;
+pub use minkowski::{PlanarFunctionals, SpatialFunctionals, planar_functionals, spatial_functionals};
 pub use two_point::{radial_mean, two_point};

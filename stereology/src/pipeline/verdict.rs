@@ -2,20 +2,8 @@
 
 use crate::pipeline::Comparison;
 use serde::Serialize;
-use stereology_metrics::Finding;
+use stereology_metrics::{Finding, Level};
 use stereology_unfold::Estimate;
-
-/// How a check turned out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// Within its limit.
-    Good,
-    /// Beyond its limit; usable with care.
-    Care,
-    /// Far beyond its limit, or not a number.
-    Bad,
-}
 
 /// What a check examines. Serialised in kebab case: `goodness-of-fit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]

@@ -1,15 +1,20 @@
 //! `stereology measure`: a solid compared with an image by its slices.
 
+mod figures;
+mod geometry;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use image::{Rgb, RgbImage};
 use ndarray::{Array3, Array4, ArrayView3, Axis, Ix3};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 use stereology::grid::{SampleType, read_npy, read_volume};
-use stereology::metrics::{Comparison, Family, FamilyError, Figure, copying, sections, sections_inside};
-use stereology::pipeline::{CompareOptions, compare_solid};
+use stereology::metrics::{
+    BlockSource, BlockTest, Comparison, Family, FamilyError, Figure, block_test, copying, sections, sections_inside,
+};
+use stereology::pipeline::{CompareOptions, Level, compare_solid};
 use stereology::segment::read_photo;
 use stereology::spectrum::BandPass;
 
@@ -20,6 +25,8 @@ use crate::outputs::{check_file, write_text};
 use crate::progress::{Step, go_on};
 use crate::values::{count, pair, positive};
 use crate::warnings::Warning;
+use figures::{Figures, VerdictFields};
+use geometry::PhasesFields;
 use stereology_report::{MeasureReport, significant};
 
 /// Measures how similar the slices of a volume are to an image, or to the slices of another volume
@@ -28,8 +35,9 @@ use stereology_report::{MeasureReport, significant};
 /// EXEMPLAR run along z and its columns along x (slices xz) or along y (slices yz); rows of xy slices run along y.
 ///
 /// Every measure is reported with its ideal (0 for a distance, 1 for a ratio, otherwise the exemplar's own value) and
-/// its floor: the difference between two halves of the exemplar. A solid at the floor is as similar to its exemplar as
-/// the exemplar's halves are to each other. Fringe lengths and tortuosities are meaningful only for layered textures.
+/// its floor: the mean difference between halves of the exemplar. It is good up to 2 floors from its ideal, needs care up
+/// to 4, and is bad beyond. A classifier also decides for blocks of slices and exemplar where each comes from: if it
+/// cannot, they are as similar as its 17 features can show. Fringe lengths and tortuosities are meaningful only for layered textures.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology measure exemplar.png solid.npy --slices xz,yz --report measures.html")]
 pub struct Measure {
@@ -100,6 +108,18 @@ pub struct MeasureFields {
     /// Every measure with its ideal and its floor.
     #[serde(flatten)]
     figures: Figures,
+    /// The worst of it, and how many figures have which level.
+    verdict: VerdictFields,
+    /// Whether a classifier distinguishes blocks of the slices from blocks of the exemplar; null if there are fewer
+    /// than 8 blocks of 16 pixels on a side.
+    classifier: Option<ClassifierFields>,
+    /// Geometry of the phases above and below the threshold.
+    phases: PhasesFields,
+    /// Correlation of the amplitudes of neighbouring octave bands, finest pair first.
+    scale_magnitudes_by_pair: SidesFields<Vec<f64>>,
+    /// Correlation of the phases of neighbouring octave bands, finest pair first: real part (positive for bright lines,
+    /// negative for dark ones) and imaginary part (negative for edges).
+    scale_phases_by_pair: SidesFields<Vec<f64>>,
     /// Number of slices measured.
     slices: usize,
     /// Families of slices.
@@ -121,6 +141,73 @@ pub struct MeasureFields {
     copying: Option<CopyingFields>,
 }
 
+/// A quantity of both sides.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SidesFields<T> {
+    /// Of the exemplar.
+    exemplar: T,
+    /// Of the volume.
+    volume: T,
+}
+
+impl<T> SidesFields<T> {
+    fn of([exemplar, volume]: [T; 2]) -> Self {
+        Self { exemplar, volume }
+    }
+}
+
+/// A classifier two-sample test of blocks.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ClassifierFields {
+    /// Fraction of the blocks whose side is found by a classifier that has not seen them: about 0.5 if it cannot
+    /// distinguish them.
+    accuracy: f64,
+    /// Probability of at least this accuracy if the blocks are exchangeable.
+    p_value: f64,
+    /// good: p above .01; care: p up to .01; bad: also an accuracy of at least .8.
+    #[schemars(with = "String")]
+    level: Level,
+    /// Blocks of each side.
+    blocks: usize,
+    /// Side of a block in pixels.
+    side: usize,
+    /// Means of the features, the largest difference first.
+    features: Vec<FeatureFields>,
+}
+
+/// Means of one feature over the blocks.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FeatureFields {
+    /// Its name.
+    name: &'static str,
+    /// Mean over the blocks of the exemplar.
+    exemplar: f64,
+    /// Mean over the blocks of the volume.
+    volume: f64,
+    /// Difference in standard deviations of all blocks.
+    difference: f64,
+}
+
+impl ClassifierFields {
+    /// Fields of a test.
+    pub fn of(test: &BlockTest) -> Self {
+        let feature = |of: &stereology::metrics::FeatureMeans| FeatureFields {
+            name: of.name,
+            exemplar: of.exemplar,
+            volume: of.solid,
+            difference: of.difference,
+        };
+        Self {
+            accuracy: test.accuracy,
+            p_value: test.p_value,
+            level: test.level(),
+            blocks: test.blocks,
+            side: test.side,
+            features: test.features.iter().map(feature).collect(),
+        }
+    }
+}
+
 /// How the voxels of a solid were copied from the pixels of its exemplar.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct CopyingFields {
@@ -130,103 +217,6 @@ pub struct CopyingFields {
     perplexity: f64,
     /// Longest run of pixels copied in one piece.
     longest_copy: usize,
-}
-
-/// The measures by name, each as NAME, NAME_ideal and NAME_floor.
-#[derive(Debug)]
-pub struct Figures([(&'static str, Figure); MEASURES.len()]);
-
-/// Names and meanings of the measures, in the order of [`Comparison::figures`].
-const MEASURES: [(&str, &str); 15] = [
-    (
-        "kl_grey",
-        "Kullback-Leibler divergence of the histograms of grey levels, in nats",
-    ),
-    (
-        "std_ratio",
-        "Standard deviation of grey levels over that of the exemplar",
-    ),
-    ("skewness", "Skewness of grey levels"),
-    (
-        "kl_orientation",
-        "Kullback-Leibler divergence of the histograms of directions, in nats",
-    ),
-    ("coherence", "Coherence of the structure tensor, 0 to 1"),
-    (
-        "fringe_length",
-        "Mean length of the fringes that lie inside a window, in pixels",
-    ),
-    (
-        "fringe_length_by_ends",
-        "Twice the visible length of fringes over their visible ends, in pixels",
-    ),
-    (
-        "tortuosity",
-        "Mean length of a fringe over the distance between its ends",
-    ),
-    (
-        "s2",
-        "Root mean square difference of the two-point correlation of the bright phase",
-    ),
-    (
-        "lineal_path",
-        "Largest difference of the lineal-path function of the bright phase",
-    ),
-    (
-        "chord_ratio",
-        "Mean chord length of the bright phase over that of the exemplar",
-    ),
-    (
-        "local_porosity",
-        "Wasserstein-1 distance of the local fractions of the bright phase",
-    ),
-    ("swd7", "Sliced Wasserstein distance of patches of 7 x 7 pixels"),
-    ("swd16", "Sliced Wasserstein distance of patches of 16 x 16 pixels"),
-    ("gradient_ratio", "Mean gradient over that of the exemplar"),
-];
-
-impl Serialize for Figures {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let rows = self.0.iter().flat_map(|(name, Figure { value, ideal, floor })| {
-            [
-                ((*name).to_owned(), value),
-                (format!("{name}_ideal"), ideal),
-                (format!("{name}_floor"), floor),
-            ]
-        });
-        serializer.collect_map(rows)
-    }
-}
-
-impl JsonSchema for Figures {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Figures".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let (mut properties, mut required) = (serde_json::Map::new(), Vec::new());
-        for (name, meaning) in MEASURES {
-            for (key, what) in [
-                (name.to_owned(), format!("{meaning}; null if not measurable.")),
-                (format!("{name}_ideal"), format!("Ideal value of `{name}`.")),
-                (
-                    format!("{name}_floor"),
-                    format!("Distance of `{name}` from its ideal between two halves of the exemplar."),
-                ),
-            ] {
-                properties.insert(
-                    key.clone(),
-                    serde_json::json!({ "description": what, "type": ["number", "null"] }),
-                );
-                required.push(key);
-            }
-        }
-        json_schema!({ "type": "object", "properties": properties, "required": required })
-    }
 }
 
 impl Fields for MeasureFields {
@@ -275,10 +265,18 @@ impl Measure {
             ..CompareOptions::default()
         };
         let step = Step::begin("measure", everywhere.quiet);
-        let found = compare_solid(&pictures, &slices, &options, &|done| step.at(done)).or_fail()?;
+        let found = compare_solid(&pictures, &slices, &options, &|done| step.at(0.9 * done)).or_fail()?;
+        go_on()?;
+        let test = self.block_test(&exemplar.values, &volume.values, mask.as_ref(), everywhere.seed);
+        let geometry = PhasesFields::of(
+            [&pictures, &slices],
+            [&exemplar.values, &volume.values],
+            mask.is_none(),
+            found.curves.threshold,
+        );
         drop(step);
         go_on()?;
-        let mut fields = fields(&mut notes, &found, slices.len(), &self.slices);
+        let mut fields = fields(&mut notes, &found, slices.len(), &self.slices, test.as_ref(), geometry);
         if let Some(path) = &self.sources {
             fields.copying = Some(self.copying(&mut notes, path, &exemplar.values, &volume.values)?);
         }
@@ -295,12 +293,46 @@ impl Measure {
                 slices: shown.collect(),
                 number: slices.len(),
                 comparison: &found,
+                blocks: test.as_ref(),
+                phases: fields.phases.rows(),
                 command: everywhere.invocation.command.clone(),
                 parameters: everywhere.invocation.parameters.clone(),
             };
             write_text(path, &report.page().or_fail()?)?;
         }
         Answer::new(&fields, notes)
+    }
+
+    /// Blocks of the volume against blocks of the exemplar.
+    fn block_test(
+        &self,
+        exemplar: &Array4<f32>,
+        volume: &Array4<f32>,
+        mask: Option<&Array3<bool>>,
+        seed: u64,
+    ) -> Option<BlockTest> {
+        let families = &self.slices.0;
+        let planes = [exemplar.index_axis(Axis(0), 0)];
+        let exemplar = if exemplar.dim().0 == 1 {
+            BlockSource::Images(&planes)
+        } else {
+            BlockSource::Volume {
+                voxels: exemplar.view(),
+                families,
+                mask: None,
+            }
+        };
+        let pictures = [volume.index_axis(Axis(0), 0)];
+        let volume = if volume.dim().0 == 1 {
+            BlockSource::Images(&pictures)
+        } else {
+            BlockSource::Volume {
+                voxels: volume.view(),
+                families,
+                mask: mask.map(|mask| mask.view()),
+            }
+        };
+        block_test(&exemplar, &volume, seed)
     }
 
     /// Which voxels of the volume count; all if `None`.
@@ -378,21 +410,45 @@ impl Measure {
     }
 }
 
-fn fields(notes: &mut Notes, found: &Comparison, slices: usize, families: &Families) -> MeasureFields {
+fn fields(
+    notes: &mut Notes,
+    found: &Comparison,
+    slices: usize,
+    families: &Families,
+    test: Option<&BlockTest>,
+    phases: PhasesFields,
+) -> MeasureFields {
     let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), significant);
+    let verdict = VerdictFields::of(found, test);
+    notes.line(verdict.line());
+    notes.line(match test {
+        Some(test) => format!(
+            "classifier: {} of {} blocks of {} pixels recognised, p {} ({})",
+            significant(test.accuracy),
+            2 * test.blocks,
+            test.side,
+            significant(test.p_value),
+            figures::word(test.level())
+        ),
+        None => "classifier: too few blocks of 16 pixels".to_owned(),
+    });
     notes.line(format!(
-        "{:<22} {:>10} {:>10} {:>10} {:>10}",
-        "", "volume", "ideal", "floor", "in floors"
+        "{:<22} {:>10} {:>10} {:>10} {:>10}  {}",
+        "", "volume", "ideal", "floor", "in floors", "level"
     ));
     for (name, figure) in found.figures() {
         let Figure { value, ideal, floor } = figure;
         notes.line(format!(
-            "{name:<22} {:>10} {:>10} {:>10} {:>10}",
+            "{name:<22} {:>10} {:>10} {:>10} {:>10}  {}",
             shown(value),
             shown(ideal),
             shown(floor),
-            shown(figure.in_floors())
+            shown(figure.in_floors()),
+            figure.level().map_or("-", figures::word)
         ));
+    }
+    for line in phases.lines() {
+        notes.line(line);
     }
     let curves = &found.curves;
     notes.line(format!(
@@ -413,6 +469,11 @@ fn fields(notes: &mut Notes, found: &Comparison, slices: usize, families: &Famil
     }
     MeasureFields {
         figures: Figures(found.figures()),
+        verdict,
+        classifier: test.map(ClassifierFields::of),
+        phases,
+        scale_magnitudes_by_pair: SidesFields::of(curves.scale_magnitudes.clone()),
+        scale_phases_by_pair: SidesFields::of(curves.scale_phases.clone()),
         slices,
         families: families.0.iter().map(ToString::to_string).collect(),
         threshold: f64::from(curves.threshold),

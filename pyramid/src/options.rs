@@ -276,7 +276,7 @@ pub struct TextureReport {
     /// exemplar) over the bands (orientations of a level together) of the brightness, and over planes normal to axes,
     /// face and space diagonals (axes only in [`Mode::Oriented`]). Empty for images.
     pub slice_errors: Vec<f64>,
-    /// The same for the finished volume; zero for images.
+    /// The same for the finished volume; zero for images. Bands below one grey level of 8 bits are not errors.
     pub final_error: f64,
     /// Findings with the codes `levels-reduced`, `few-samples` and `constant-exemplar`.
     pub findings: Vec<Finding>,

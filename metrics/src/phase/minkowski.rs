@@ -57,8 +57,9 @@ impl SpatialFunctionals {
 }
 
 /// Minkowski functionals of a phase of an image. What lies outside the image is unknown, so the estimates use the
-/// squares of 2 × 2 pixels inside it: they are unbiased for sections of a homogeneous material. Sums over an image whose
-/// border does not belong to the phase are those of its figures. Zero for images less than two pixels high or wide.
+/// squares of 2 × 2 pixels inside it: they are unbiased for sections of a homogeneous material. Sums over an image
+/// whose border does not belong to the phase are those of its figures. Zero for images less than two pixels high or
+/// wide.
 ///
 /// The boundary length has an error of 1 to 2 % for outlines of many directions, is 5 % low for straight outlines along
 /// rows or columns, and misses parts finer than two pixels. Cost: linear.
@@ -110,8 +111,8 @@ pub fn planar_functionals(phase: ArrayView2<'_, bool>) -> PlanarFunctionals {
 /// Minkowski functionals of a phase of a volume, from the cubes of 2 × 2 × 2 voxels inside it, as in
 /// [`planar_functionals`]. Zero for volumes less than two voxels along an axis.
 ///
-/// The specific surface has an error of about 1 % for surfaces of many directions, and is 7 % low for planes normal to an
-/// axis. The mean curvature averages planes normal to the axes only, so it is exact only for materials whose mean
+/// The specific surface has an error of about 1 % for surfaces of many directions, and is 7 % low for planes normal to
+/// an axis. The mean curvature averages planes normal to the axes only, so it is exact only for materials whose mean
 /// over the axes is that over all directions. Cost: linear.
 ///
 /// # Formula

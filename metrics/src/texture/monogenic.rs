@@ -36,8 +36,8 @@ impl MonogenicBand {
     }
 }
 
-/// The finest `levels` octave bands of an image, finest first. The image is mirrored at its borders, so that they are no
-/// edges. Cost: N log N for each band.
+/// The finest `levels` octave bands of an image, finest first. The image is mirrored at its borders, so that they are
+/// no edges. Cost: N log N for each band.
 #[allow(clippy::cast_possible_truncation, reason = "single precision suffices")]
 pub(crate) fn monogenic_bands(image: &Array2<f32>, levels: usize) -> Vec<MonogenicBand> {
     let (height, width) = image.dim();

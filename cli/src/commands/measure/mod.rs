@@ -35,9 +35,10 @@ use stereology_report::{MeasureReport, significant};
 /// EXEMPLAR run along z and its columns along x (slices xz) or along y (slices yz); rows of xy slices run along y.
 ///
 /// Every measure is reported with its ideal (0 for a distance, 1 for a ratio, otherwise the exemplar's own value) and
-/// its floor: the mean difference between halves of the exemplar. It is good up to 2 floors from its ideal, needs care up
-/// to 4, and is bad beyond. A classifier also decides for blocks of slices and exemplar where each comes from: if it
-/// cannot, they are as similar as its 17 features can show. Fringe lengths and tortuosities are meaningful only for layered textures.
+/// its floor: the mean difference between halves of the exemplar. It is good up to 2 floors from its ideal, needs care
+/// up to 4, and is bad beyond. A classifier also decides for blocks of slices and exemplar where each comes from: if
+/// it cannot, they are as similar as its 17 features can show. Fringe lengths and tortuosities are meaningful only for
+/// layered textures.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology measure exemplar.png solid.npy --slices xz,yz --report measures.html")]
 pub struct Measure {

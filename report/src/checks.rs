@@ -1,6 +1,6 @@
 //! The checks of a verdict in words: what was found, what it should be, what it means and what to do.
 
-use stereology::pipeline::{Check, CheckName, Level, Verdict};
+use stereology::pipeline::{Check, CheckName, Level, Opinion, OutlineDistance, Verdict};
 
 use crate::figures::SynthesisReport;
 use crate::number::{percent, significant};
@@ -60,17 +60,21 @@ pub(crate) fn sentence(verdict: &Verdict) -> String {
     }
 }
 
-/// Numbers and appearance, each with its worst check unless all are good.
-pub(crate) fn opinions(verdict: &Verdict) -> String {
-    let opinion = |of: &stereology::pipeline::Opinion| match of.level {
-        Level::Good => "good".to_owned(),
-        level => format!("{} ({})", word(level), title(of.worst).to_lowercase()),
-    };
-    format!(
-        "Numbers: {}. Appearance: {}.",
-        opinion(&verdict.numbers),
-        opinion(&verdict.appearance)
-    )
+/// One of the two verdicts: its level, and its worst check with what was found.
+pub(crate) fn opinion(of: &Opinion, input: &SynthesisReport) -> String {
+    let checks = &input.verdict.checks;
+    let number = checks
+        .iter()
+        .filter(|check| check.name.is_appearance() == of.worst.is_appearance())
+        .count();
+    let worst = checks.iter().find(|check| check.name == of.worst);
+    let worst = worst.map_or_else(String::new, |check| {
+        format!("{}: {}.", title(check.name), found(check, input))
+    });
+    match of.level {
+        Level::Good => format!("All {number} checks are good. The nearest to its limit: {worst}"),
+        Level::Care | Level::Bad => format!("Worst of {number} checks: {worst}"),
+    }
 }
 
 /// The level in a word.
@@ -95,6 +99,8 @@ fn title(name: CheckName) -> &'static str {
         CheckName::TotalInterval => "Number of particles",
         CheckName::ResegmentedSizes => "Profile sizes on sections segmented like the photograph",
         CheckName::ResegmentedAreaFraction => "Area fraction of sections segmented like the photograph",
+        CheckName::SectionAxisRatios => "Axis ratios of the profiles on sections",
+        CheckName::SectionSolidities => "Solidities of the profiles on sections",
         CheckName::Texture => "Texture of the solid's slices",
     }
 }
@@ -134,6 +140,8 @@ fn found(check: &Check, input: &SynthesisReport) -> String {
         CheckName::ResegmentedAreaFraction => comparison.resegmented.as_ref().map_or_else(String::new, |of| {
             fractions(of.area_fraction_synthetic, of.area_fraction_photo)
         }),
+        CheckName::SectionAxisRatios => outline(check, comparison.outlines.map(|of| of.axis_ratio)),
+        CheckName::SectionSolidities => outline(check, comparison.outlines.map(|of| of.solidity)),
         CheckName::Texture => {
             let worst = comparison
                 .spectrum
@@ -151,6 +159,18 @@ fn found(check: &Check, input: &SynthesisReport) -> String {
             }
         }
     }
+}
+
+/// Means of a quantity of outlines, and its distance.
+fn outline(check: &Check, of: Option<OutlineDistance>) -> String {
+    let means = of.map_or_else(String::new, |of| {
+        format!(
+            ": mean {}, photograph {}",
+            significant(of.synthetic),
+            significant(of.photo)
+        )
+    });
+    format!("distance {}{means}", significant(check.value))
 }
 
 /// The largest penetration of a certificate, in mean sizes; below zero the smallest gap.
@@ -177,6 +197,7 @@ fn should_be(check: &Check) -> String {
         CheckName::SectionSizes | CheckName::SectionColours | CheckName::ResegmentedSizes => {
             format!("{} or less", percent(limit))
         }
+        CheckName::SectionAxisRatios | CheckName::SectionSolidities => format!("{} or less", significant(limit)),
         CheckName::TotalInterval => format!("interval narrower than {} of the number", percent(limit)),
         CheckName::Texture => format!("factor of {} or less", significant(10_f64.powf(limit))),
     }
@@ -213,6 +234,12 @@ fn meaning(name: CheckName) -> &'static str {
         }
         CheckName::ResegmentedSizes | CheckName::ResegmentedAreaFraction => {
             "Images of the solid's sections, segmented like the photograph: these are the only checks that reveal a bias of the segmentation itself."
+        }
+        CheckName::SectionAxisRatios => {
+            "Minor over major axis of each profile, on sections segmented like the photograph. A difference means that the particles have another shape than the assumed one; the table of shapes shows by how much that changes the number of particles."
+        }
+        CheckName::SectionSolidities => {
+            "Area of each profile over that of its convex hull: 1 for convex outlines. If the solid's profiles are more convex, its particles are too smooth, or touching particles of the photograph were outlined as one."
         }
         CheckName::Texture => {
             "Power of the residual texture by spatial frequency, photograph compared with sections (root mean square, weighted by power). If they differ much, the texture has structures that this synthesis cannot reproduce, or too little of the photograph is away from outlines to measure it."

@@ -1,7 +1,7 @@
 //! Content of the report of a synthesis.
 
 use image::RgbImage;
-use stereology::pipeline::{ResidualSpectra, Verdict};
+use stereology::pipeline::{OutlineComparison, ResidualSpectra, ShapeDensity, Verdict};
 
 /// A warning with its advice.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,6 +98,8 @@ pub struct SizeFigures {
     pub volume_fraction: f64,
     /// Shapes and their fractions.
     pub shapes: Vec<(String, f64)>,
+    /// Particles per volume under several shapes.
+    pub by_shape: Vec<ShapeDensity>,
     /// Method and kernel by name.
     pub method: String,
     /// Deviance of the refolded counts and its degrees of freedom.
@@ -136,6 +138,8 @@ pub struct ComparisonFigures {
     pub exact: SectionFigures,
     /// Sections rendered and segmented like the photograph.
     pub resegmented: Option<SectionFigures>,
+    /// Outlines of the drawn sections.
+    pub outlines: Option<OutlineComparison>,
     /// Profile size histogram of the exact sections over `SizeFigures::profile_edges`, scaled to the photograph's area.
     pub profiles_synthetic: Vec<f64>,
     /// Radial power spectra of the residual in photograph and sections.

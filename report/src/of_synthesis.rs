@@ -123,6 +123,7 @@ fn sizes(synthesis: &Synthesis, types: &ParticleTypes) -> SizeFigures {
         mean_size: found.mean_size.value,
         volume_fraction: synthesis.population.unfolded_fraction,
         shapes: types.types().iter().map(|of| (of.name.clone(), of.share)).collect(),
+        by_shape: synthesis.by_shape.clone(),
         method: format!("{}, {kernel} kernel", found.method.name()),
         deviance: found.deviance,
         degrees_of_freedom: found.degrees_of_freedom as f64,
@@ -143,6 +144,7 @@ fn comparison(synthesis: &Synthesis, images: SolidImages) -> ComparisonFigures {
     ComparisonFigures {
         exact: figures(&found.exact),
         resegmented: found.resegmented.as_ref().map(figures),
+        outlines: found.outlines,
         profiles_synthetic: histogram(
             &found.section_sizes,
             &synthesis.densities.profile_edges,

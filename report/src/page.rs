@@ -2,11 +2,11 @@
 
 use askama::Template;
 use image::RgbImage;
-use stereology::pipeline::{CheckName, Level};
+use stereology::pipeline::{CheckName, Level, ShapeDensity};
 
 use crate::checks;
 use crate::data_url;
-use crate::figures::{Remark, SectionFigures, SynthesisReport};
+use crate::figures::{Remark, SectionFigures, SizeFigures, SynthesisReport};
 use crate::number::{counted, percent, significant};
 use crate::plot::Plot;
 use crate::size_plots;
@@ -45,6 +45,8 @@ struct SynthesisPage<'a> {
     class: &'static str,
     word: &'static str,
     sentence: String,
+    opinions: [OpinionBox; 2],
+    by_shape: Vec<ShapeRow>,
     tiles: Vec<Tile>,
     weak: Vec<CheckRow>,
     checks: Vec<CheckRow>,
@@ -69,6 +71,21 @@ struct SynthesisPage<'a> {
     texture: Option<Texture>,
     command: &'a str,
     parameters: &'a [(String, String)],
+}
+
+/// The verdict on numbers or on appearance.
+struct OpinionBox {
+    about: &'static str,
+    class: &'static str,
+    word: &'static str,
+    text: String,
+}
+
+/// Estimates under one shape.
+struct ShapeRow {
+    shape: String,
+    is_used: bool,
+    values: [String; 5],
 }
 
 struct Tile {
@@ -148,11 +165,18 @@ pub fn synthesis_page(report: &SynthesisReport) -> Result<String, askama::Error>
             Level::Care => "Trustworthy with care",
             Level::Bad => "Not trustworthy yet",
         },
-        sentence: format!(
-            "{} {}",
-            checks::sentence(&report.verdict),
-            checks::opinions(&report.verdict)
-        ),
+        sentence: checks::sentence(&report.verdict),
+        opinions: [
+            ("Numbers", &report.verdict.numbers),
+            ("Appearance", &report.verdict.appearance),
+        ]
+        .map(|(about, opinion)| OpinionBox {
+            about,
+            class: class(opinion.level),
+            word: checks::word(opinion.level),
+            text: checks::opinion(opinion, report),
+        }),
+        by_shape: sizes.by_shape.iter().map(|row| shape_row(row, sizes)).collect(),
         tiles: tiles(report),
         weak: checks.iter().filter(|row| row.class != good).cloned().collect(),
         checks,
@@ -196,6 +220,27 @@ pub(crate) fn class(level: Level) -> &'static str {
         Level::Good => "good",
         Level::Care => "fair",
         Level::Bad => "poor",
+    }
+}
+
+/// Total, its ratio to the reported one, mean size, volume fraction, p-value.
+fn shape_row(row: &ShapeDensity, sizes: &SizeFigures) -> ShapeRow {
+    let values = row.estimates.map_or_else(
+        || ["-"; 5].map(str::to_owned),
+        |of| {
+            [
+                significant(of.total),
+                significant(of.total / sizes.total),
+                significant(of.mean_size),
+                percent(of.volume_fraction),
+                of.p_value.map_or_else(|| "-".to_owned(), significant),
+            ]
+        },
+    );
+    ShapeRow {
+        is_used: matches!(&sizes.shapes[..], [(shape, _)] if *shape == row.shape),
+        shape: row.shape.clone(),
+        values,
     }
 }
 

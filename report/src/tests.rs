@@ -2,7 +2,10 @@
 
 use image::{Rgb, RgbImage};
 use stereology::metrics::Finding;
-use stereology::pipeline::{Comparison, Evidence, Level, ResidualSpectra, Verdict};
+use stereology::pipeline::{
+    Comparison, Evidence, Level, OutlineComparison, OutlineDistance, ResidualSpectra, ShapeDensity, ShapeEstimates,
+    Verdict,
+};
 use stereology::unfold::{Estimate, Interval};
 
 use super::{
@@ -22,6 +25,21 @@ fn picture(width: u32, height: u32, shift: u32) -> RgbImage {
             Rgb([90 + grain, 92 + grain, 96 + grain])
         }
     })
+}
+
+fn outlines() -> OutlineComparison {
+    let distance = |photo: f64| OutlineDistance {
+        photo,
+        synthetic: photo + 0.01,
+        distance: 0.012,
+        expected: 0.01,
+    };
+    OutlineComparison {
+        profiles_photo: 300,
+        profiles_synthetic: 900,
+        axis_ratio: distance(0.71),
+        solidity: distance(0.95),
+    }
 }
 
 fn made_up_verdict(findings: &[Finding]) -> Verdict {
@@ -50,6 +68,7 @@ fn made_up_verdict(findings: &[Finding]) -> Verdict {
         smallest_gap: 2e-4,
         exact,
         resegmented: Some(Comparison { size_w1: 0.12, ..exact }),
+        outlines: Some(outlines()),
         texture_error: Some(0.08),
     })
 }
@@ -135,6 +154,21 @@ fn made_up() -> SynthesisReport {
             mean_size: 15.3,
             volume_fraction: 0.43,
             shapes: vec![("rock:1".to_owned(), 0.7), ("sphere".to_owned(), 0.3)],
+            by_shape: vec![
+                ShapeDensity {
+                    shape: "sphere".to_owned(),
+                    estimates: Some(ShapeEstimates {
+                        total: 3.6e-4,
+                        mean_size: 13.1,
+                        volume_fraction: 0.42,
+                        p_value: Some(0.31),
+                    }),
+                },
+                ShapeDensity {
+                    shape: "box:1,1,1".to_owned(),
+                    estimates: None,
+                },
+            ],
             method: "em, integrated kernel".to_owned(),
             deviance: 8.1,
             degrees_of_freedom: 7.0,
@@ -153,6 +187,7 @@ fn made_up() -> SynthesisReport {
             sections: vec![picture(480, 320, 1), picture(480, 320, 2)],
             exact,
             resegmented: Some(SectionFigures { size_w1: 0.12, ..exact }),
+            outlines: Some(outlines()),
             profiles_synthetic: observed.iter().map(|n| 1.03 * n).collect(),
             spectrum: Some(ResidualSpectra {
                 frequency: (1..=32).map(|i| f64::from(i) / 64.0).collect(),
@@ -202,11 +237,18 @@ fn the_page_shows_the_verdict() {
     let mut input = made_up();
     assert_eq!(input.verdict.level(), Level::Care); // a warning about small profiles
     let html = page(&input);
-    assert!(html.contains("Trustworthy with care") && html.contains("Numbers: with care (outlines of the profiles)"));
+    assert!(html.contains("Trustworthy with care") && html.contains("Numbers: with care"));
+    assert!(html.contains("Worst of 11 checks: Outlines of the profiles") && html.contains("Appearance: good"));
+    // The reported 2.4e-4 are two thirds of what spheres would be.
+    assert!(html.contains("Ratio to the reported number") && html.contains("1.50"));
     assert!(html.contains("smallest gap 2.00e-4 of the mean size"));
     input.verdict = made_up_verdict(&[]);
     let html = page(&input);
-    assert!(html.contains("All 12 checks are good") && html.contains("Numbers: good. Appearance: good."));
+    assert!(
+        html.contains("All 14 checks are good")
+            && html.contains("Numbers: good")
+            && html.contains("All 3 checks are good. The nearest to its limit: ")
+    );
 }
 
 #[test]

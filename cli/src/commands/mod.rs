@@ -17,6 +17,7 @@ pub mod schema;
 pub mod segment;
 pub mod shape;
 pub mod slice;
+mod synthesis_verdict;
 pub mod synthesize;
 pub mod texture;
 pub mod unfold;

@@ -13,8 +13,8 @@ use stereology::files;
 use stereology::grid::Format;
 use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{
-    self, Check, CheckName, Comparison, DensityError, Extent, Level, Opinion, ParticleTypes, PopulationFailure,
-    Synthesis, SynthesisError, SynthesisOptions, Verdict,
+    self, Comparison, DensityError, Extent, ParticleTypes, PopulationFailure, Synthesis, SynthesisError,
+    SynthesisOptions,
 };
 use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
@@ -26,6 +26,7 @@ use stereology::volume::{Channel, SlicePlane};
 use crate::answer::{Answer, Fields, Notes};
 use crate::commands::pack::pack_failure;
 use crate::commands::segment::SegmentFields;
+use crate::commands::synthesis_verdict::{OutlineFields, ShapeFields, VerdictFields};
 use crate::commands::unfold::{Defaults, UnfoldingFields, types};
 use crate::commands::{pack, segment, texture, unfold};
 use crate::everywhere::Everywhere;
@@ -126,65 +127,10 @@ pub struct SynthesizeFields {
     texture: TexturedPhoto,
     /// Sections of the solid compared with the photograph.
     verification: VerificationFields,
+    /// Particles per volume if all particles had one of several shapes: how far the shape decides the number.
+    shapes: Vec<ShapeFields>,
     /// Whether the numbers and the appearance of the solid can be trusted.
     verdict: VerdictFields,
-}
-
-/// Whether a solid can be trusted.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct VerdictFields {
-    /// Reliability of densities, sizes and fractions.
-    numbers: OpinionFields,
-    /// Similarity of sections of the solid to the photograph.
-    appearance: OpinionFields,
-    /// All checks.
-    checks: Vec<VerdictCheck>,
-}
-
-/// The worst level of several checks.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct OpinionFields {
-    /// good, care or bad.
-    #[schemars(with = "String")]
-    level: Level,
-    /// The check farthest beyond its limit.
-    #[schemars(with = "String")]
-    worst: CheckName,
-}
-
-/// A check of the solid.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct VerdictCheck {
-    /// What is examined.
-    #[schemars(with = "String")]
-    name: CheckName,
-    /// What was found; null if it is not a number.
-    value: Option<f64>,
-    /// Limit of the level good.
-    limit: f64,
-    /// good (within the limit), care or bad.
-    #[schemars(with = "String")]
-    level: Level,
-}
-
-impl VerdictFields {
-    fn of(verdict: &Verdict) -> Self {
-        let opinion = |of: Opinion| OpinionFields {
-            level: of.level,
-            worst: of.worst,
-        };
-        let check = |of: &Check| VerdictCheck {
-            name: of.name,
-            value: Some(of.value).filter(|value| value.is_finite()),
-            limit: of.limit,
-            level: of.level,
-        };
-        Self {
-            numbers: opinion(verdict.numbers),
-            appearance: opinion(verdict.appearance),
-            checks: verdict.checks.iter().map(check).collect(),
-        }
-    }
 }
 
 /// Particles per volume.
@@ -270,6 +216,9 @@ pub struct VerificationFields {
     exact: ComparisonFields,
     /// The same for sections that were segmented like the photograph; null if there are none.
     resegmented: Option<ComparisonFields>,
+    /// Outlines of the profiles on sections that were segmented like the photograph; null with fewer than 20 profiles
+    /// of at least 50 pixels on a side.
+    outlines: Option<OutlineFields>,
 }
 
 /// A comparison of sections with the photograph.
@@ -461,7 +410,9 @@ impl Synthesize {
             verification: VerificationFields {
                 exact: ComparisonFields::of(&verification.exact),
                 resegmented: verification.resegmented.as_ref().map(ComparisonFields::of),
+                outlines: verification.outlines.as_ref().map(OutlineFields::of),
             },
+            shapes: synthesis.by_shape.iter().map(ShapeFields::of).collect(),
             verdict: VerdictFields::of(&synthesis.verdict),
         };
         let mut notes = Notes::default();

@@ -283,7 +283,7 @@ mod tests {
             ("lower_edge,upper_edge,number_density\n1,1,2\n", "is empty"),
             (
                 "lower_edge,upper_edge,number_density\n0,1,2\n3,4,2\n",
-                "follow each other",
+                "must be contiguous",
             ),
             ("lower_edge,upper_edge,number_density\n0,1,\n", "nothing to pack"),
         ] {

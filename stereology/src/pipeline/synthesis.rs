@@ -4,8 +4,8 @@ use crate::pipeline::colouring::particle_colours;
 use crate::pipeline::narrowing::single;
 use crate::pipeline::{
     DensityError, DensityOptions, Evidence, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes,
-    Population, PopulationFailure, Recipe, ResidualSpectra, Verdict, Verification, VerificationError, fine_details,
-    population, residual_spectra, unfold_profiles, verify,
+    Population, PopulationFailure, Recipe, ResidualSpectra, ShapeDensity, Verdict, Verification, VerificationError,
+    densities_by_shape, fine_details, population, residual_spectra, unfold_profiles, verify,
 };
 use image::RgbImage;
 use ndarray::Array2;
@@ -109,6 +109,8 @@ pub struct Synthesis {
     pub solid: Solid,
     /// Its sections, compared with the photograph.
     pub verification: Verification,
+    /// Particles per volume under several shapes.
+    pub by_shape: Vec<ShapeDensity>,
     /// Power spectra of the residual in photograph and sections; `None` if either is too small or all outlines.
     pub spectra: Option<ResidualSpectra>,
     /// Whether to trust the result.
@@ -260,6 +262,7 @@ pub fn synthesize(
         .iter()
         .map(|finding| Finding::new(finding.code, finding.message.clone()))
         .collect();
+    let by_shape = densities_by_shape(&profiles, &options.densities);
     let spectra = residual_spectra(&segmentation, &solid, options.pixel).ok();
     let verdict = Verdict::new(&Evidence {
         findings: findings.clone(),
@@ -272,6 +275,7 @@ pub fn synthesize(
         smallest_gap: packing.certificate().least_gap / mean_size(&packing),
         exact: verification.exact,
         resegmented: verification.resegmented,
+        outlines: verification.outlines,
         texture_error: spectra.as_ref().map(ResidualSpectra::log_error),
     });
     for of_step in [&densities.findings, &population.findings, &details.findings] {
@@ -286,6 +290,7 @@ pub fn synthesize(
         details,
         solid,
         verification,
+        by_shape,
         spectra,
         verdict,
         findings,

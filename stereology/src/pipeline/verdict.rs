@@ -1,6 +1,6 @@
 //! Whether to trust a solid and its numbers: every check with its value, its limit and its level.
 
-use crate::pipeline::Comparison;
+use crate::pipeline::{Comparison, OutlineComparison, OutlineDistance};
 use serde::Serialize;
 use stereology_metrics::{Finding, Level};
 use stereology_unfold::Estimate;
@@ -32,6 +32,10 @@ pub enum CheckName {
     ResegmentedSizes,
     /// [`SectionAreaFraction`](Self::SectionAreaFraction) of drawn sections, segmented like the photograph.
     ResegmentedAreaFraction,
+    /// Wasserstein-1 distance of the axis ratios of profiles on drawn sections and photograph.
+    SectionAxisRatios,
+    /// Wasserstein-1 distance of the solidities of profiles on drawn sections and photograph.
+    SectionSolidities,
     /// Error of the power spectrum of the residual texture: root mean square of log10 of the ratio.
     Texture,
 }
@@ -40,7 +44,7 @@ impl CheckName {
     /// Whether the check is about the appearance of the solid; otherwise it is about numbers.
     #[must_use]
     pub fn is_appearance(self) -> bool {
-        matches!(self, Self::SectionColours | Self::Texture)
+        matches!(self, Self::SectionColours | Self::SectionSolidities | Self::Texture)
     }
 
     /// Whether values at or above the limit are good; otherwise values at or below it.
@@ -145,6 +149,8 @@ pub struct Evidence {
     pub exact: Comparison,
     /// Drawn sections segmented like the photograph.
     pub resegmented: Option<Comparison>,
+    /// Outlines of drawn sections.
+    pub outlines: Option<OutlineComparison>,
     /// Error of the power spectrum of the residual
     /// ([`ResidualSpectra::log_error`](crate::pipeline::ResidualSpectra::log_error)).
     pub texture_error: Option<f64>,
@@ -155,6 +161,16 @@ pub struct Evidence {
 struct Limits {
     good: f64,
     care: f64,
+}
+
+impl Limits {
+    /// The limits, or what the numbers of profiles can distinguish if that is more.
+    fn of_samples(self, distance: &OutlineDistance) -> Self {
+        Self {
+            good: self.good.max(SAMPLING.good * distance.expected),
+            care: self.care.max(SAMPLING.care * distance.expected),
+        }
+    }
 }
 
 /// Warnings of the segmentation after which the outlines need a look: some profiles may be missed, merged or clipped,
@@ -204,6 +220,17 @@ const INTERVAL: Limits = Limits { good: 0.5, care: 1.0 };
 const RESEGMENTED_SIZES: Limits = Limits { good: 0.20, care: 0.35 };
 /// Twice the limits of exact sections, as for sizes.
 const RESEGMENTED_AREA_FRACTION: Limits = Limits { good: 0.10, care: 0.20 };
+/// An axis ratio of .05 more or less is not visible side by side. A difference of .05 to .25 means another shape than
+/// the assumed one: particles of axes 1 : .7 : .5 measured as spheres are 12 % too many, cubes 150 %, so that the number
+/// needs care. .25 is the difference of spheres from particles twice as long as wide.
+const AXIS_RATIOS: Limits = Limits { good: 0.05, care: 0.25 };
+/// A digitised disc of 200 pixels has a solidity of .98, with a spread of .005 between places on the grid. .02 is a
+/// convex outline against one with a few dents, .05 against a ragged one, or against two touching particles as one
+/// profile.
+const SOLIDITIES: Limits = Limits { good: 0.02, care: 0.05 };
+/// Expected distances of two samples of one distribution that are good whatever the limit, and that need care: the
+/// distance of two samples exceeds twice its expectation about once in 100 times, four times it practically never.
+const SAMPLING: Limits = Limits { good: 2.0, care: 4.0 };
 /// log10 of a factor of 1.5 and of 2.5 in power, 1.2 and 1.6 in contrast: the first is hardly visible side by side, the
 /// second is a coarser or finer texture.
 const TEXTURE: Limits = Limits {
@@ -225,7 +252,7 @@ impl Verdict {
     /// };
     /// let verdict = Verdict::new(&Evidence {
     ///     findings: Vec::new(), profiles: 300, deviance: 90.0, degrees_of_freedom: 88, total: Estimate { value: 1e-4, interval: None },
-    ///     volume_fraction: 0.41, area_fraction: 0.4, smallest_gap: 1e-5, exact, resegmented: None, texture_error: None,
+    ///     volume_fraction: 0.41, area_fraction: 0.4, smallest_gap: 1e-5, exact, resegmented: None, outlines: None, texture_error: None,
     /// });
     /// assert_eq!((verdict.numbers.level, verdict.numbers.worst), (Level::Care, CheckName::SectionSizes));
     /// assert_eq!(verdict.appearance.level, Level::Good);
@@ -269,6 +296,13 @@ impl Verdict {
                 area(again),
                 RESEGMENTED_AREA_FRACTION,
             ));
+        }
+        if let Some(outlines) = &of.outlines {
+            let distances = [
+                (CheckName::SectionAxisRatios, &outlines.axis_ratio, AXIS_RATIOS),
+                (CheckName::SectionSolidities, &outlines.solidity, SOLIDITIES),
+            ];
+            checks.extend(distances.map(|(name, of, limits)| Check::new(name, of.distance, limits.of_samples(of))));
         }
         if let Some(error) = of.texture_error {
             checks.push(Check::new(CheckName::Texture, error, TEXTURE));
@@ -324,10 +358,25 @@ fn worst<'a>(first: Check, checks: impl Iterator<Item = &'a Check>) -> Opinion {
 #[cfg(test)]
 mod tests {
     use super::{Check, CheckName, Evidence, Level, TEXTURE, Verdict};
-    use crate::pipeline::Comparison;
+    use crate::pipeline::{Comparison, OutlineComparison, OutlineDistance};
     use proptest::prelude::*;
     use stereology_metrics::Finding;
     use stereology_unfold::{Estimate, Interval};
+
+    fn outlines(axis_ratio: f64, solidity: f64) -> OutlineComparison {
+        let of = |photo: f64, distance: f64, expected: f64| OutlineDistance {
+            photo,
+            synthetic: photo + distance,
+            distance,
+            expected,
+        };
+        OutlineComparison {
+            profiles_photo: 300,
+            profiles_synthetic: 900,
+            axis_ratio: of(0.7, axis_ratio, 0.015),
+            solidity: of(0.95, solidity, 0.02),
+        }
+    }
 
     fn evidence() -> Evidence {
         let exact = Comparison {
@@ -356,6 +405,7 @@ mod tests {
             smallest_gap: 0.0,
             exact,
             resegmented: Some(Comparison { size_w1: 0.12, ..exact }),
+            outlines: Some(outlines(0.03, 0.01)),
             texture_error: Some(0.05),
         }
     }
@@ -384,6 +434,17 @@ mod tests {
         assert_eq!(level(|of| of.texture_error = Some(0.2)), Level::Care);
         assert_eq!(level(|of| of.exact.size_w1 = f64::NAN), Level::Bad);
         assert_eq!(level(|of| of.deviance = 7.0 + 3.1 * 14.0_f64.sqrt()), Level::Care);
+        assert_eq!(level(|of| of.outlines = Some(outlines(0.2, 0.01))), Level::Care);
+        // What so few profiles cannot distinguish is good.
+        assert_eq!(level(|of| of.outlines = Some(outlines(0.03, 0.039))), Level::Good);
+        let mut ragged = evidence();
+        ragged.outlines = Some(outlines(0.1, 0.09));
+        let verdict = Verdict::new(&ragged);
+        assert_eq!(verdict.numbers.worst, CheckName::SectionAxisRatios);
+        assert_eq!(
+            (verdict.appearance.level, verdict.appearance.worst),
+            (Level::Bad, CheckName::SectionSolidities)
+        );
         let mut poor = evidence();
         (poor.profiles, poor.exact.size_w1) = (240, 0.19);
         let verdict = Verdict::new(&poor);

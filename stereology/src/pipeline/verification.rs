@@ -2,8 +2,9 @@
 
 use stereology_metrics::{Progress, wasserstein};
 
-use crate::pipeline::MeasuredProfiles;
 use crate::pipeline::narrowing::{count_between, pixels_between};
+use crate::pipeline::outline_comparison::compare_outlines;
+use crate::pipeline::{MeasuredProfiles, OutlineComparison};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -19,6 +20,8 @@ pub struct Verification {
     /// Sections drawn at the photograph's scale and measured like the photograph: the only test that shows a bias of
     /// the segmentation. `None` if no particles were found on them.
     pub resegmented: Option<Comparison>,
+    /// Outlines on the drawn sections, compared with those of the photograph; `None` if too few profiles have a shape.
+    pub outlines: Option<OutlineComparison>,
     /// Profile sizes of the exact sections, above the detection limit of the photograph.
     pub section_sizes: Vec<f64>,
     /// Area of the exact sections; length squared.
@@ -156,6 +159,7 @@ pub fn verify(
         .map(|drawn| measure(drawn, recipe, &|_| progress(0.4)))
         .collect::<Result<Vec<_>, VerificationError>>()?;
     let measured: Vec<Segmentation> = measured.into_iter().flatten().collect();
+    let outlines = compare_outlines(photo, &measured);
     let resegmented = (!measured.is_empty()).then(|| {
         let sizes: Vec<(f64, f64)> = measured
             .iter()
@@ -184,6 +188,7 @@ pub fn verify(
     Ok(Verification {
         exact,
         resegmented,
+        outlines,
         section_sizes: sections.sizes,
         section_area: sections.area,
         pictures: pictures.into_iter().map(|drawn| drawn.picture).collect(),

@@ -208,8 +208,8 @@ impl Kernel {
 ///
 /// # Errors
 ///
-/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one per kernel, finite, not negative and not
-/// all zero.
+/// [`KernelError`] if there is no kernel, shapes differ or fractions are not one per kernel, finite, not negative and
+/// not all zero.
 ///
 /// ```
 /// use nalgebra::dmatrix;

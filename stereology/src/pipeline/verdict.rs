@@ -221,8 +221,8 @@ const RESEGMENTED_SIZES: Limits = Limits { good: 0.20, care: 0.35 };
 /// Twice the limits of exact sections, as for sizes.
 const RESEGMENTED_AREA_FRACTION: Limits = Limits { good: 0.10, care: 0.20 };
 /// An axis ratio of .05 more or less is not visible side by side. A difference of .05 to .25 means another shape than
-/// the assumed one: particles of axes 1 : .7 : .5 measured as spheres are 12 % too many, cubes 150 %, so that the number
-/// needs care. .25 is the difference of spheres from particles twice as long as wide.
+/// the assumed one: particles of axes 1 : .7 : .5 measured as spheres are 12 % too many, cubes 150 %, so that the
+/// number needs care. .25 is the difference of spheres from particles twice as long as wide.
 const AXIS_RATIOS: Limits = Limits { good: 0.05, care: 0.25 };
 /// A digitised disc of 200 pixels has a solidity of .98, with a spread of .005 between places on the grid. .02 is a
 /// convex outline against one with a few dents, .05 against a ragged one, or against two touching particles as one

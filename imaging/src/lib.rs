@@ -37,18 +37,24 @@
 //! assert!((lab([1.0, 1.0, 1.0])[0] - 100.0).abs() < 0.01);
 //! ```
 
+mod area_average;
 mod components;
 mod disjoint_sets;
 mod distance_transform;
 mod gaussian;
+mod gaussian_dilation;
 mod lab;
 mod otsu;
+mod point_spread;
 mod srgb;
 
+pub use area_average::area_average_rgb;
 pub use components::{Connectivity, connected_components, label_components, label_components_3d};
 pub use disjoint_sets::DisjointSets;
 pub use distance_transform::{distance_to_other_region, distance_transform, squared_distance_transform};
 pub use gaussian::{gaussian_filter, gaussian_filter_rgb};
+pub use gaussian_dilation::gaussian_dilation;
 pub use lab::{lab, lab_image};
 pub use otsu::otsu;
+pub use point_spread::point_spread;
 pub use srgb::{encoded, encoded_byte, linear};

@@ -51,6 +51,7 @@
 mod conversions;
 mod error;
 mod files;
+mod found;
 mod ground;
 mod labels;
 mod options;
@@ -58,8 +59,10 @@ mod outlines;
 mod quality;
 mod segment;
 mod segmentation;
+mod working_scale;
 
 pub use error::SegmentError;
+pub use files::compression::Compression;
 pub use files::label_map::{LabelFile, read_labels, read_labels_for, write_labels};
 pub use files::photo::{PhotoFile, encoded_image, read_photo, read_photo_up_to};
 pub use ground::binder::BinderModel;

@@ -3,6 +3,7 @@
 use stereology_metrics::EdgeRule;
 
 use crate::error::SegmentError;
+use crate::files::compression::Compression;
 
 /// What to do with binder-coloured holes inside a profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,6 +65,8 @@ pub struct SegmentOptions {
     pub rise: [f32; 2],
     /// Standard deviation of the Gaussian filter applied first, pixels.
     pub smoothing: f32,
+    /// How the photo was compressed, if it comes from a JPEG: differences of colour within its errors are not particles.
+    pub compression: Option<Compression>,
     /// Seed of every random choice.
     pub seed: u64,
 }
@@ -79,6 +82,7 @@ impl Default for SegmentOptions {
             thresholds: [5.0, 9.0],
             rise: [0.7, 0.1],
             smoothing: 1.0,
+            compression: None,
             seed: 0,
         }
     }
@@ -152,6 +156,13 @@ impl SegmentOptions {
     #[must_use]
     pub const fn with_smoothing(mut self, sigma: f32) -> Self {
         self.smoothing = sigma;
+        self
+    }
+
+    /// How the photo was compressed, as [`PhotoFile::compression`](crate::PhotoFile::compression) states it.
+    #[must_use]
+    pub const fn with_compression(mut self, compression: Option<Compression>) -> Self {
+        self.compression = compression;
         self
     }
 

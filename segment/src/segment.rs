@@ -3,17 +3,17 @@
 use std::ops::ControlFlow;
 
 use image::RgbImage;
-use stereology_imaging::{gaussian_filter_rgb, lab_image};
+use stereology_imaging::area_average_rgb;
 use stereology_metrics::{Finding, Progress};
 
 use crate::error::SegmentError;
 use crate::files::photo::{MOST_PIXELS, encoded_image, too_large};
-use crate::ground::seen::{Ground, Seen, chosen_binder};
-use crate::labels::flecks::remove_flecks;
-use crate::labels::split::{basins_of, fill_label_holes, required_rise, split_by_colour};
-use crate::options::{Holes, SegmentOptions};
-use crate::quality::{binder_finding, count_findings, counts_by_rise, counts_by_threshold};
+use crate::found::find;
+use crate::ground::seen::Ground;
+use crate::options::SegmentOptions;
+use crate::quality::{binder_finding, count_findings};
 use crate::segmentation::Segmentation;
+use crate::working_scale::{WorkingScale, spread_of};
 
 /// Finds the profiles of particles in a photo of a section.
 ///
@@ -51,26 +51,23 @@ pub fn segment(
         ControlFlow::Break(()) => Err(SegmentError::Cancelled),
     };
     report(0.0)?;
-    let colours = gaussian_filter_rgb(encoded_image(photo).view(), options.smoothing);
-    report(0.15)?;
-    let binder = chosen_binder(&colours, options)?;
-    report(0.3)?;
-    let mut seen = Seen::new(photo, &colours, binder, options);
-    let regions = seen.regions();
-    report(0.4)?;
-    let mask = seen.outlined(regions, &colours, options);
-    report(0.6)?;
-    let parts = split_by_colour(&lab_image(colours.view()), &mask, options.seed);
-    report(0.75)?;
-    let basins = basins_of(&parts, &seen.depth(&parts));
-    let mut labels = basins.divided(required_rise(parts.dim(), options.rise));
-    let by_rise = counts_by_rise(&basins, parts.dim(), options);
-    drop((basins, parts));
-    let [_, high] = seen.thresholds;
-    remove_flecks(&mut labels, &seen.distance, &seen.deviation, high, options.min_area);
-    if options.holes == Holes::Fill {
-        fill_label_holes(&mut labels);
-    }
+    let image = encoded_image(photo);
+    let spread = spread_of(&image);
+    let scale = WorkingScale::of(image.dim(), spread);
+    let (found, labels) = match scale {
+        None => {
+            let mut found = find(&image, spread, options, &report)?;
+            let labels = std::mem::take(&mut found.labels);
+            (found, labels)
+        }
+        Some(scale) => {
+            let reduced = area_average_rgb(image.view(), scale.size);
+            drop(image);
+            let found = find(&reduced, spread / scale.factor, &scale.options(options), &report)?;
+            let labels = scale.at_full_size(&found, options.smoothing);
+            (found, labels)
+        }
+    };
     report(0.9)?;
     let mut out = Segmentation::measured(photo, labels, options);
     if out.profiles.is_empty() {
@@ -78,16 +75,15 @@ pub fn segment(
             min_area: options.min_area,
         });
     }
-    let left_out = mask.indexed_iter().filter(|(p, m)| **m && out.labels[*p] == 0);
-    out.rejected = left_out.map(|((y, x), _)| [y, x]).collect();
+    out.reject(&found.mask);
     out.renumber();
+    let seen = &found.seen;
     out.findings
         .extend(binder_finding(seen.covered, seen.is_clear, out.area_fraction));
     if matches!(seen.ground, Ground::Densest) {
         out.findings.push(Finding::new("vague-binder", "binder and particle colours overlap: regions that differ clearly from the most common colour are outlined, and particles with colours of the binder are missed; look at the overlay, give the binder's colour, or import a label map"));
     }
-    let by_threshold = counts_by_threshold(&seen.distance, &seen.deviation, seen.thresholds, options);
-    out.findings.extend(count_findings(by_threshold, by_rise));
+    out.findings.extend(count_findings(found.by_threshold, found.by_rise));
     report(1.0)?;
     Ok(out)
 }

@@ -80,6 +80,14 @@ impl Segmentation {
         }
     }
 
+    /// Notes the pixels of a mask that belong to no profile. The mask may be of a reduced photo.
+    pub(crate) fn reject(&mut self, mask: &Array2<bool>) {
+        let ((rows, columns), (height, width)) = (mask.dim(), self.labels.dim());
+        let outside = self.labels.indexed_iter().filter(|(_, l)| **l == 0);
+        let in_mask = outside.filter(|((y, x), _)| mask[[y * rows / height, x * columns / width]]);
+        self.rejected = in_mask.map(|((y, x), _)| [y, x]).collect();
+    }
+
     /// Numbers 1, 2, ... in reading order of the first pixels.
     pub(crate) fn renumber(&mut self) {
         let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();

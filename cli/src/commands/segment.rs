@@ -150,7 +150,7 @@ impl Segment {
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
         let read = read_photo_up_to(&self.photo, self.max_pixels).at(&self.photo)?;
         let (photo, mut findings) = (read.photo, read.findings);
-        let options = self.choices.options(everywhere.seed);
+        let options = self.choices.options(everywhere.seed).with_compression(read.compression);
         let step = Step::begin("segmenting", everywhere.quiet);
         let found = match &self.choices.labels {
             Some(path) => {

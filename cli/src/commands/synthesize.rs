@@ -19,7 +19,7 @@ use stereology::pipeline::{
 use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
 use stereology::sample;
-use stereology::segment::{read_labels_for, read_photo};
+use stereology::segment::{PhotoFile, read_labels_for, read_photo_up_to};
 use stereology::shape::TriangleMesh;
 use stereology::volume::{Channel, SlicePlane};
 
@@ -257,7 +257,7 @@ impl Fields for SynthesizeFields {
 
 impl Synthesize {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let options = self.options(everywhere)?;
+        let mut options = self.options(everywhere)?;
         if self.solid.voxels > MOST_VOXELS {
             return Err(Failure::run(format!(
                 "--voxels {}: volume.npy would need {:.1e} bytes; give at most {MOST_VOXELS}, or use `stereology export` on the finished solid",
@@ -266,7 +266,15 @@ impl Synthesize {
             )));
         }
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
-        let (photo, name) = self.photo()?;
+        let (
+            PhotoFile {
+                photo,
+                compression,
+                findings,
+            },
+            name,
+        ) = self.photo()?;
+        options.segment.compression = compression;
         let types = self.types()?;
         let shapes = types.types().len();
         if let Some(none) = self.solid.voids.iter().find(|&&k| k >= shapes) {
@@ -280,7 +288,8 @@ impl Synthesize {
             .as_ref()
             .map(|path| read_labels_for(path, (photo.height() as usize, photo.width() as usize)).at(path))
             .transpose()?;
-        let (labels, noticed) = labels.map_or((None, Vec::new()), |read| (Some(read.labels), read.findings));
+        let (labels, mut noticed) = labels.map_or((None, Vec::new()), |read| (Some(read.labels), read.findings));
+        noticed.extend(findings);
         let stages = Stages::begin(everywhere.quiet);
         let synthesis = pipeline::synthesize(&photo, labels, &types, &options, &|step, done| {
             stages.at(step.name(), done)
@@ -332,16 +341,21 @@ impl Synthesize {
     }
 
     /// The photograph and its name.
-    fn photo(&self) -> Result<(RgbImage, String), Failure> {
+    fn photo(&self) -> Result<(PhotoFile, String), Failure> {
         let Some(path) = &self.photo else {
-            return Ok((sample::photo().or_fail()?, "The built-in sample".to_owned()));
+            let sample = PhotoFile {
+                photo: sample::photo().or_fail()?,
+                compression: None,
+                findings: Vec::new(),
+            };
+            return Ok((sample, "The built-in sample".to_owned()));
         };
         let name = path
             .file_name()
             .unwrap_or(path.as_os_str())
             .to_string_lossy()
             .into_owned();
-        Ok((read_photo(path).at(path)?, name))
+        Ok((read_photo_up_to(path, u64::MAX).at(path)?, name))
     }
 
     fn types(&self) -> Result<ParticleTypes, Failure> {

@@ -1,6 +1,7 @@
 //! Photographs, label maps and images of a segmentation in files.
 
 mod coco;
+pub(crate) mod compression;
 mod geojson;
 mod imagej_roi;
 pub(crate) mod images;

@@ -6,6 +6,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::Array2;
 
 use crate::error::SegmentError;
+use crate::files::compression::Compression;
 use stereology_metrics::Finding;
 
 /// A photograph from a file, and findings on how it was read.
@@ -13,6 +14,8 @@ use stereology_metrics::Finding;
 pub struct PhotoFile {
     /// 8-bit sRGB, up is up.
     pub photo: RgbImage,
+    /// How the file was compressed, if it is a JPEG.
+    pub compression: Option<Compression>,
     /// `alpha-over-white`.
     pub findings: Vec<Finding>,
 }
@@ -99,6 +102,7 @@ pub fn read_photo_up_to(path: impl AsRef<Path>, most: u64) -> Result<PhotoFile, 
     Ok(PhotoFile {
         findings: (through > 0).then(finding).into_iter().collect(),
         photo: over_white(image),
+        compression: Compression::of(&bytes),
     })
 }
 

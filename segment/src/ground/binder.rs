@@ -158,19 +158,29 @@ impl BinderModel {
     /// would follow hue alone.
     #[must_use]
     pub fn blunted(&self, deviation: f64) -> Self {
+        let variance = deviation * deviation;
+        self.with_errors(&[[variance, 0.0, 0.0], [0.0, variance, 0.0], [0.0, 0.0, variance]])
+    }
+
+    /// The same binder with the covariance of errors added to that of its colours.
+    pub(crate) fn with_errors(&self, errors: &[[f64; 3]; 3]) -> Self {
         let [[a, ..], [b, c, _], [d, e, f]] = self.whitening;
         // Inverse of the lower triangle W, whose product with its transpose is Σ.
         let (l00, l11, l22) = (1.0 / a, 1.0 / c, 1.0 / f);
         let l10 = -b * l00 * l11;
         let l21 = -e * l11 * l22;
         let l20 = -(d * l00 + e * l10) * l22;
-        let covariance = [
+        let mut covariance = [
             [l00 * l00, 0.0, 0.0],
             [l10 * l00, l10 * l10 + l11 * l11, 0.0],
             [l20 * l00, l20 * l10 + l21 * l11, l20 * l20 + l21 * l21 + l22 * l22],
         ];
+        covariance
+            .iter_mut()
+            .zip(errors)
+            .for_each(|(row, errors)| row.iter_mut().zip(errors).for_each(|(c, e)| *c += e));
         Self {
-            whitening: inverse_factor(&covariance, deviation * deviation),
+            whitening: inverse_factor(&covariance, 0.0),
             ..self.clone()
         }
     }

@@ -3,8 +3,8 @@
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
 
-use crate::conversions::whole_part;
 use crate::ground::binder::{BinderModel, length};
+use crate::ground::enlarged::enlarged;
 use crate::outlines::half_contrast::half_contrast;
 use crate::outlines::regions::{hysteresis, neighbours8, open};
 
@@ -66,7 +66,7 @@ pub fn faint_regions(
     if candidates.iter().all(|c| !c) {
         return none;
     }
-    let fine = enlarged(&deviation, dim);
+    let fine = enlarged(&deviation, dim, [CELL as f32; 2]);
     let mut faint = Array2::from_shape_fn(dim, |(y, x)| {
         let cell = [
             (y / CELL).min(candidates.dim().0 - 1),
@@ -121,23 +121,5 @@ fn averaged(image: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool>)
         let weight = weights[[j, i]];
         let light = binder.light(i * CELL, j * CELL);
         (weight >= KNOWN).then(|| std::array::from_fn(|c| light[c] + sums[[j, i]][c] / weight))
-    })
-}
-
-/// A field of cells at every pixel, by linear interpolation between the cells' centres.
-fn enlarged(field: &Array2<[f32; 3]>, dim: (usize, usize)) -> Array2<[f32; 3]> {
-    let (rows, columns) = field.dim();
-    let between = |i: usize, n: usize| {
-        let at = ((i as f32 + 0.5) / CELL as f32 - 0.5).clamp(0.0, (n - 1) as f32);
-        let low = whole_part(f64::from(at)).min(n.saturating_sub(2));
-        (low, (low + 1).min(n - 1), at - low as f32)
-    };
-    Array2::from_shape_fn(dim, |(y, x)| {
-        let ((u, d, v), (l, r, h)) = (between(y, rows), between(x, columns));
-        std::array::from_fn(|c| {
-            let top = field[[u, l]][c] + h * (field[[u, r]][c] - field[[u, l]][c]);
-            let bottom = field[[d, l]][c] + h * (field[[d, r]][c] - field[[d, l]][c]);
-            top + v * (bottom - top)
-        })
     })
 }

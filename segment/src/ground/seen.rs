@@ -1,14 +1,13 @@
 //! What kind of ground a photo has, and how far every pixel differs from it.
 
-use image::RgbImage;
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter_rgb};
 
 use crate::conversions::single;
 use crate::error::SegmentError;
-use crate::files::photo::encoded_image;
 use crate::ground::binder::{BinderModel, length};
 use crate::ground::faint::faint_regions;
+use crate::ground::rims::{hidden_by_blur, without_rims};
 use crate::ground::tones::{TONE_DISTANCE, TwoTones, densest, main_colours, mean_depth};
 use crate::labels::split::{contrast_depth, shape_depth};
 use crate::options::{BinderChoice, Holes, SegmentOptions};
@@ -24,6 +23,9 @@ const NEAR: f32 = 0.5;
 const FAINT: f32 = 0.7;
 /// Least scatter, sRGB / 255, while outlines are drawn: four levels.
 const HUE_SCATTER: f64 = 4.0 / 255.0;
+/// A pixel of at least this multiple of the high threshold is no part of a faint particle: it is a particle too small
+/// for its outline.
+const CLEARLY: f32 = 2.0;
 /// Fraction of the distance of two tones at which touching particles are apart.
 const CLEAR: f32 = 0.7;
 /// Iterations of refining outlines: the third moves them by less than a tenth of a pixel.
@@ -85,28 +87,38 @@ impl Seen {
     /// Chooses the ground: the binder if it is given or clearly separated from the rest; else two tones with sharp
     /// borders; else the most frequent colour, if enough differs from it clearly; else the binder after all.
     pub(crate) fn new(
-        photo: &RgbImage,
+        image: &Array2<[f32; 3]>,
         colours: &Array2<[f32; 3]>,
         binder: BinderModel,
+        spread: f32,
         options: &SegmentOptions,
     ) -> Self {
         let given = options.binder != BinderChoice::Found;
-        let seen = Self::by_binder(colours, binder, given, options);
+        let seen = Self::by_binder(colours, binder, given, spread, options);
         if seen.is_clear || given {
             return seen;
         }
         let Ground::Binder(binder) = &seen.ground else {
             return seen;
         };
-        Self::by_two_tones(photo, binder, options)
+        Self::by_two_tones(image, binder, options)
             .or_else(|| Self::by_densest(colours, options))
             .unwrap_or(seen)
     }
 
-    fn by_binder(colours: &Array2<[f32; 3]>, binder: BinderModel, given: bool, options: &SegmentOptions) -> Self {
+    fn by_binder(
+        colours: &Array2<[f32; 3]>,
+        binder: BinderModel,
+        given: bool,
+        spread: f32,
+        options: &SegmentOptions,
+    ) -> Self {
+        let binder = with_compression(binder, options);
         let distance = binder.distance(colours);
         let [low, high] = options.thresholds;
         let is_connected = given || surrounds(&distance.mapv(|z| z < low));
+        let hue = options.compression.map_or(0.0, |c| c.hue_spread());
+        let distance = without_rims(&distance, options.smoothing.hypot(spread).hypot(hue));
         Self {
             is_clear: is_connected && stands_out(&distance, options.thresholds),
             deviation: binder.blunted(HUE_SCATTER).deviation(colours),
@@ -119,8 +131,8 @@ impl Seen {
 
     /// `None` if the photo, its light evened by that of a binder and smoothed half as much, has not two tones with
     /// sharp borders.
-    fn by_two_tones(photo: &RgbImage, light: &BinderModel, options: &SegmentOptions) -> Option<Self> {
-        let smoothed = gaussian_filter_rgb(encoded_image(photo).view(), 0.5 * options.smoothing);
+    fn by_two_tones(image: &Array2<[f32; 3]>, light: &BinderModel, options: &SegmentOptions) -> Option<Self> {
+        let smoothed = gaussian_filter_rgb(image.view(), 0.5 * options.smoothing);
         let even = light.even_light(&smoothed);
         let tones = TwoTones::find(&even, options.seed).filter(|t| t.separation() > TWO_TONES)?;
         let binder = tones.binder(&even);
@@ -143,7 +155,7 @@ impl Seen {
 
     /// `None` if the most frequent colour covers little, or little differs from it clearly.
     fn by_densest(colours: &Array2<[f32; 3]>, options: &SegmentOptions) -> Option<Self> {
-        let binder = BinderModel::fit_near(colours, densest(colours));
+        let binder = with_compression(BinderModel::fit_near(colours, densest(colours)), options);
         let distance = binder.distance(colours);
         let thresholds = options.thresholds.map(|z| NEAR * z);
         let is_clear = binder.covered() > LEAST_COVERED
@@ -171,17 +183,19 @@ impl Seen {
         &mut self,
         mut mask: Array2<bool>,
         colours: &Array2<[f32; 3]>,
+        spread: f32,
         options: &SegmentOptions,
     ) -> Array2<bool> {
         self.clean(&mut mask, options);
         // The first outline follows the threshold, so that its cores hold blurred rims; later iterations have cleaner
         // ones.
-        let blur = options.smoothing.hypot(SHARP);
+        let blur = options.smoothing.hypot(spread.max(SHARP));
         for _ in 0..self.iterations() {
             mask = half_contrast(&self.deviation, &mask, blur);
         }
         if let Ground::Binder(binder) = &self.ground {
-            let faint = faint_regions(colours, binder, &mask, self.thresholds.map(|z| FAINT * z));
+            let hidden = hidden_by_blur(&self.distance, &mask, CLEARLY * self.thresholds[1], blur);
+            let faint = faint_regions(colours, binder, &hidden, self.thresholds.map(|z| FAINT * z));
             mask.zip_mut_with(&faint, |m, z| *m |= *z > 0.0);
             self.distance.zip_mut_with(&faint, |d, z| *d = d.max(*z));
         }
@@ -211,6 +225,14 @@ impl Seen {
             Ground::TwoTones => contrast_depth(&self.distance, parts, CLEAR * TONE_DISTANCE),
             Ground::Binder(_) | Ground::Densest => shape_depth(parts),
         }
+    }
+}
+
+/// A binder with the errors of the photo's compression added to its scatter.
+fn with_compression(binder: BinderModel, options: &SegmentOptions) -> BinderModel {
+    match options.compression {
+        Some(compression) => binder.with_errors(&compression.covariance()),
+        None => binder,
     }
 }
 

@@ -4,6 +4,7 @@
 pub(crate) mod category;
 pub(crate) mod flecks;
 pub(crate) mod import;
+pub(crate) mod nearest;
 pub(crate) mod outline;
 pub(crate) mod profile;
 pub(crate) mod profile_shape;

@@ -179,6 +179,7 @@ impl FromStr for BinderArgument {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CategoriesArgument {
     Count(usize),
+    Separated,
     Silhouette,
     Gap,
 }
@@ -188,11 +189,12 @@ impl FromStr for CategoriesArgument {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
+            "separated" => Ok(Self::Separated),
             "silhouette" => Ok(Self::Silhouette),
             "gap" => Ok(Self::Gap),
             number => count(number)
                 .map(Self::Count)
-                .map_err(|_| "a whole number from 1 to 255, `silhouette` or `gap` is needed".to_owned()),
+                .map_err(|_| "a whole number from 1 to 255, `separated`, `silhouette` or `gap` is needed".to_owned()),
         }
     }
 }

@@ -32,8 +32,12 @@ pub enum BinderChoice {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CategoryCount {
-    /// The number from 2 to 8 with the best mean silhouette, one if that is below 0.5 (Rousseeuw 1987).
+    /// Groups of colours, up to 8, between which colours are rarer than in both by a binomial test; one if the colours
+    /// form a continuum.
     #[default]
+    Separated,
+    /// The number from 2 to 8 with the best mean silhouette, one if that is below 0.5 (Rousseeuw 1987). It divides a
+    /// continuum of colours into as many groups as it can.
     Silhouette,
     /// The first number from 1 to 8 whose gap statistic is at least that of the next number minus its standard error
     /// (Tibshirani, Walther & Hastie 2001).
@@ -65,7 +69,8 @@ pub struct SegmentOptions {
     pub rise: [f32; 2],
     /// Standard deviation of the Gaussian filter applied first, pixels.
     pub smoothing: f32,
-    /// How the photo was compressed, if it comes from a JPEG: differences of colour within its errors are not particles.
+    /// How the photo was compressed, if it comes from a JPEG: differences of colour within its errors are not
+    /// particles.
     pub compression: Option<Compression>,
     /// Seed of every random choice.
     pub seed: u64,
@@ -76,7 +81,7 @@ impl Default for SegmentOptions {
         Self {
             binder: BinderChoice::Found,
             min_area: 20,
-            categories: CategoryCount::Silhouette,
+            categories: CategoryCount::Separated,
             holes: Holes::Fill,
             edge_rule: EdgeRule::AssociatedPoint,
             thresholds: [5.0, 9.0],
@@ -107,6 +112,13 @@ impl SegmentOptions {
     #[must_use]
     pub const fn with_main_colour(mut self, number: usize) -> Self {
         self.binder = BinderChoice::MainColour(number);
+        self
+    }
+
+    /// Number of colour categories by silhouette.
+    #[must_use]
+    pub const fn with_silhouette(mut self) -> Self {
+        self.categories = CategoryCount::Silhouette;
         self
     }
 

@@ -49,10 +49,15 @@ impl WorkingScale {
         })
     }
 
-    /// Options at this scale. Smoothing and rise stay as they are, in pixels of the reduced photo.
+    /// Options at this scale. Smoothing stays as it is, in pixels of the reduced photo; the least rise is that of a
+    /// photo with the point spread of a sharp one.
     pub(crate) fn options(&self, options: &SegmentOptions) -> SegmentOptions {
         let area = options.min_area as f64 / f64::from(self.factor).powi(2);
-        options.clone().with_min_area(whole_part(area.round()))
+        let [pixels, fraction] = options.rise;
+        options
+            .clone()
+            .with_min_area(whole_part(area.round()))
+            .with_rise(pixels * SHARP / REDUCED, fraction)
     }
 
     /// Labels at the photo's own size: enlarged, their outlines then moved to half contrast between pixels of the

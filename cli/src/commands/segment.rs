@@ -27,8 +27,8 @@ use stereology_report::{percent, significant};
 /// Writes into DIR: labels.tif (0 = binder), profiles.csv (id, x, y, area, size, r, g, b, category, touches_edge,
 /// weight, left, top, right, bottom, pixels, axis_ratio, ellipticity, solidity, orientation; colours 0 to 255,
 /// orientation in degrees from the rows towards larger y; the last four are empty below 50 pixels), overlay.png (look
-/// at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing) and
-/// summary.json.
+/// at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing)
+/// and summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
 pub struct Segment {
@@ -66,11 +66,12 @@ pub struct Choices {
     /// Minimum area of a profile in pixels
     #[arg(long, value_name = "PX", value_parser = positive)]
     pub min_area: Option<f64>,
-    /// Number of colour categories of the particles, or the criterion that selects it: `silhouette` or `gap` [default:
-    /// silhouette]
+    /// Number of colour categories of the particles, or the criterion that selects it: `separated` (colours with gaps
+    /// between them), `silhouette` or `gap` [default: separated]
     #[arg(long, value_name = "K|HOW")]
     pub categories: Option<CategoriesArgument>,
-    /// Standard deviation of the Gaussian filter before segmentation, in pixels
+    /// Standard deviation of the Gaussian filter before segmentation, in pixels (of a photograph more blurred than 1.35
+    /// pixels: in multiples of its blur)
     #[arg(long, value_name = "PX", default_value_t = 1.0)]
     pub smoothing: f32,
     /// Low and high hysteresis thresholds, in standard deviations of the binder colour
@@ -137,7 +138,8 @@ impl Choices {
         match self.categories {
             Some(CategoriesArgument::Count(categories)) => options.with_categories(categories),
             Some(CategoriesArgument::Gap) => options.with_gap(),
-            Some(CategoriesArgument::Silhouette) | None => options,
+            Some(CategoriesArgument::Silhouette) => options.with_silhouette(),
+            Some(CategoriesArgument::Separated) | None => options,
         }
     }
 }

@@ -6,7 +6,7 @@ use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_
 use crate::ground::binder::{BinderModel, length};
 use crate::ground::enlarged::enlarged;
 use crate::outlines::half_contrast::half_contrast;
-use crate::outlines::regions::{hysteresis, neighbours8, open};
+use crate::outlines::regions::{hysteresis, neighbours4, neighbours8, open};
 
 /// Side of a cell of the coarse image, pixels.
 const CELL: usize = 2;
@@ -16,13 +16,16 @@ const SIGMA: f32 = 1.5;
 const KNOWN: f32 = 0.25;
 /// Least area of a faint region, pixels: about that of the filter.
 const LEAST: usize = 60;
+/// Fraction of a faint region's outline at the mask beyond which it is the glow of what the mask covers.
+const GLOW: f64 = 0.3;
 
 /// Regions outside a mask that differ from the binder only on average over many pixels: their distance from the binder
 /// at that scale, 0 elsewhere.
 ///
 /// The image is averaged over about six pixels, without those of the mask and its rim, so that neither texture nor the
 /// colours of particles already found hide faint ones. The binder's light and scatter are fitted again at that scale,
-/// and the thresholds are standard deviations there.
+/// and the thresholds are standard deviations there. A region that follows the mask over more than three tenths of its
+/// outline is glow of a bright particle and is left out.
 ///
 /// # Complexity
 ///
@@ -82,13 +85,32 @@ pub fn faint_regions(
     let (components, count) = connected_components(faint.view(), |f| f);
     let mut areas = vec![0_usize; count as usize + 1];
     components.iter().for_each(|&p| areas[p as usize] += 1);
+    let glow = follow_the_mask(&components, count, mask);
     Array2::from_shape_fn(dim, |p| {
-        if faint[p] && areas[components[p] as usize] >= LEAST {
+        let component = components[p] as usize;
+        if faint[p] && areas[component] >= LEAST && !glow[component] {
             length(fine[p])
         } else {
             0.0
         }
     })
+}
+
+/// Whether each component has more than [`GLOW`] of its outline at the mask: light scattered around a bright particle
+/// follows it, particles only touch.
+fn follow_the_mask(components: &Array2<u32>, count: u32, mask: &Array2<bool>) -> Vec<bool> {
+    let mut sides = vec![(0_usize, 0_usize); count as usize + 1];
+    for ((y, x), &component) in components.indexed_iter().filter(|(_, c)| **c != 0) {
+        for q in neighbours4([y, x], components.dim()).filter(|q| components[*q] != component) {
+            let (all, masked) = &mut sides[component as usize];
+            *all += 1;
+            *masked += usize::from(mask[q]);
+        }
+    }
+    sides
+        .iter()
+        .map(|&(all, masked)| masked as f64 > GLOW * all as f64)
+        .collect()
 }
 
 /// Mean colours of cells and their surroundings, without the mask and its rim; not a number where there is hardly

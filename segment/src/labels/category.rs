@@ -8,6 +8,7 @@ use stereology_metrics::{KruskalWallis, kruskal_wallis};
 use crate::conversions::single;
 use crate::ground::kmeans::{Clusters, kmeans, silhouette};
 use crate::labels::profile::Profile;
+use crate::labels::separated::separated_groups;
 use crate::options::CategoryCount;
 
 /// Profiles of similar colour.
@@ -57,6 +58,7 @@ pub fn categorise(profiles: &mut [Profile], count: CategoryCount, seed: u64) -> 
         .collect();
     let clusters = match count {
         CategoryCount::Given(k) => kmeans(&colours, k.min(255), seed),
+        CategoryCount::Separated => separated_groups(&colours, seed),
         CategoryCount::Silhouette => best_by_silhouette(&colours, seed),
         CategoryCount::Gap => kmeans(&colours, best_by_gap(&colours, seed), seed),
     };

@@ -8,5 +8,6 @@ pub(crate) mod nearest;
 pub(crate) mod outline;
 pub(crate) mod profile;
 pub(crate) mod profile_shape;
+pub(crate) mod separated;
 pub(crate) mod split;
 pub(crate) mod watershed;

@@ -14,7 +14,7 @@ const GROUPS: usize = 8;
 /// Least depth, pixels, of both parts for them to be separate particles.
 const PART_DEPTH: f32 = 3.0;
 /// Difference of mean colour in Lab below which touching parts are one particle.
-const SAME_COLOUR: f64 = 18.0;
+const SAME_COLOUR: f64 = 10.0;
 
 /// Fraction of a part's outline shared with another part from which it is a spot of that part.
 const SPOT: f64 = 0.5;

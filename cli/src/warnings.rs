@@ -92,6 +92,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "The shape is probably wrong (try another --shape), or many profiles were missed or merged (look at overlay.png).",
     ),
     (
+        "halo",
+        "Regions along particles, with colours between theirs and that of the binder, were left out: blur or compression.",
+        "Look at overlay.png; use a photograph that is sharper or compressed less if they are particles.",
+    ),
+    (
         "impossible-area",
         "The profiles cover more than the examined area, or one profile is larger than it.",
         "Check --area and its unit, and whether the sizes are diameters or areas.",

@@ -69,7 +69,7 @@ pub fn segment(
         }
     };
     report(0.9)?;
-    let mut out = Segmentation::measured(photo, labels, options);
+    let mut out = Segmentation::measured(photo, labels, options).without_halos(options);
     if out.profiles.is_empty() {
         return Err(SegmentError::NoParticles {
             min_area: options.min_area,

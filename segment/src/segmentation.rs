@@ -5,6 +5,7 @@ use ndarray::Array2;
 use stereology_metrics::{Finding, KruskalWallis};
 
 use crate::labels::category::{Category, categorise, size_by_category};
+use crate::labels::halo::halo_categories;
 use crate::labels::profile::{Index, Profile, Window, measure, size_of_area, weigh};
 use crate::options::SegmentOptions;
 use crate::quality::profile_findings;
@@ -38,7 +39,7 @@ pub struct Segmentation {
     /// Whether profiles of different categories differ in size; `None` for fewer than two categories.
     pub size_by_category: Option<KruskalWallis>,
     /// What to know before trusting it. Codes of the photo: `alpha-over-white`, `no-binder`, `vague-binder`,
-    /// `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`. Of a label map:
+    /// `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`, `halo`. Of a label map:
     /// `clipped-labels`, `split-label`, `small-labels`, `first-page`, `overlapping-labels`, `lost-labels`.
     pub findings: Vec<Finding>,
     pub(crate) photo: RgbImage,
@@ -78,6 +79,24 @@ impl Segmentation {
             photo: photo.clone(),
             rejected: Vec::new(),
         }
+    }
+
+    /// Without the categories that are halos of others, with a finding that states how many profiles were left out.
+    pub(crate) fn without_halos(self, options: &SegmentOptions) -> Self {
+        let halos = halo_categories(&self.labels, &self.profiles, &self.categories, self.binder.colour);
+        if halos.is_empty() {
+            return self;
+        }
+        let ids: Vec<u32> = self.profiles.iter().map(|p| p.id).collect();
+        let index = Index::new(&ids);
+        let labels = self.labels.mapv(|l| {
+            let is_halo = l != 0 && halos.contains(&self.profiles[index.of(l)].category);
+            if is_halo { 0 } else { l }
+        });
+        let mut out = Self::measured(&self.photo, labels, options);
+        let dropped = self.profiles.len() - out.profiles.len();
+        out.findings.push(Finding::new("halo", format!("{dropped} regions that lie along particles, with colours between theirs and that of the binder, are blur or compression and were left out; look at the overlay, and use a photo that is sharper or compressed less if they are particles")));
+        out
     }
 
     /// Notes the pixels of a mask that belong to no profile. The mask may be of a reduced photo.

@@ -13,6 +13,7 @@ mod relief_table;
 mod renderer_check;
 mod sample;
 mod sand;
+mod scale_table;
 mod texture_table;
 mod workspace;
 
@@ -71,6 +72,8 @@ enum Task {
     },
     /// Writes the built-in sample and its true values
     Sample,
+    /// Counts the profiles of test images as JPEGs and at other sizes and writes the table into docs/segment.md
+    Scales,
 }
 
 /// A part of acceptance.
@@ -115,6 +118,7 @@ fn main() -> Result<()> {
             only.as_deref(),
         ),
         Task::Sample => sample::run(&root()?.join("stereology/assets")),
+        Task::Scales => scale_table::run(&root()?.join("docs/segment.md")),
     }
 }
 

@@ -48,6 +48,8 @@ enum Task {
     BenchReport(Forwarded),
     /// Writes the built-in sample and its true values
     Sample(Forwarded),
+    /// Counts the profiles of test images as JPEGs and at other sizes and writes the table into docs/segment.md
+    Scales(Forwarded),
 }
 
 /// Arguments of a task of the crate studies/, which parses them.
@@ -70,6 +72,7 @@ fn main() -> Result<()> {
         Task::Figures(forwarded) => study("figures", &forwarded),
         Task::BenchReport(forwarded) => study("bench-report", &forwarded),
         Task::Sample(forwarded) => study("sample", &forwarded),
+        Task::Scales(forwarded) => study("scales", &forwarded),
     }
 }
 

@@ -3,6 +3,7 @@
 
 pub(crate) mod category;
 pub(crate) mod flecks;
+pub(crate) mod halo;
 pub(crate) mod import;
 pub(crate) mod nearest;
 pub(crate) mod outline;

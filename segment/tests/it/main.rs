@@ -11,3 +11,4 @@ mod drawn;
 mod files;
 mod labels;
 mod photos;
+mod scales;

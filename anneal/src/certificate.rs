@@ -144,8 +144,10 @@ impl Packing {
         self
     }
 
-    pub(crate) fn with_tries(mut self, tries: usize) -> Self {
-        self.iterations = tries;
+    /// The same packing, found in this number of iterations: for one that is read from a file.
+    #[must_use]
+    pub fn with_iterations(mut self, iterations: usize) -> Self {
+        self.iterations = iterations;
         self
     }
 

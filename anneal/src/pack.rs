@@ -185,7 +185,7 @@ pub fn pack(arrangement: &Arrangement, options: &PackOptions, progress: Progress
             // The work is complete: cancelling now has no effect.
             let _ = progress(1.0);
             Ok(match trace {
-                Trace::Tries(tries) => packing.with_tries(tries),
+                Trace::Tries(tries) => packing.with_iterations(tries),
                 Trace::Energies(energies) => packing.with_energies(energies),
             })
         }

@@ -23,6 +23,7 @@ pub struct Notes {
     text: Vec<String>,
     warnings: Vec<Warning>,
     seconds: Option<Value>,
+    taken_up: Option<Vec<&'static str>>,
 }
 
 impl Notes {
@@ -32,11 +33,29 @@ impl Notes {
         self
     }
 
+    /// Adds lines of the summary for people.
+    pub fn lines(&mut self, lines: impl IntoIterator<Item = String>) -> &mut Self {
+        self.text.extend(lines);
+        self
+    }
+
     /// Adds a warning, unless the same one is there already.
     pub fn warn(&mut self, warning: Warning) -> &mut Self {
         if !self.warnings.contains(&warning) {
             self.warnings.push(warning);
         }
+        self
+    }
+
+    /// Steps of an earlier run that were taken up: printed, but never written into a file.
+    pub fn taken_up(&mut self, steps: Vec<&'static str>) -> &mut Self {
+        let shown = if steps.is_empty() {
+            "none".to_owned()
+        } else {
+            steps.join(", ")
+        };
+        self.text.push(format!("steps taken up: {shown}"));
+        self.taken_up = Some(steps);
         self
     }
 
@@ -96,10 +115,14 @@ impl Answer {
             text,
             warnings,
             seconds,
+            taken_up,
         } = &self.notes;
         let mut out = String::new();
         if everywhere.json {
             let mut object = self.summary();
+            if let (Some(steps), Value::Object(fields)) = (taken_up, &mut object) {
+                fields.insert("taken_up".to_owned(), json!(steps));
+            }
             if let (Some(seconds), Value::Object(fields)) = (seconds, &mut object) {
                 fields.insert("seconds".to_owned(), seconds.clone());
             }
@@ -195,6 +218,16 @@ fn common_properties(command: &str) -> (Map<String, Value>, Map<String, Value>) 
         }),
     );
     let mut after = Map::new();
+    if command == "synthesize" {
+        after.insert(
+            "taken_up".to_owned(),
+            json!({
+                "description": "Steps of an earlier run that were taken up; with --from. Printed only, never written into a file.",
+                "type": "array",
+                "items": { "type": "string" },
+            }),
+        );
+    }
     after.insert(
         "seconds".to_owned(),
         json!({

@@ -1,8 +1,10 @@
 //! Options of every command, and how the program was invoked.
 
 use clap::Args;
+use stereology::grid::LengthUnit;
 
-use crate::values::positive;
+use crate::failure::Failure;
+use crate::values::PixelLength;
 
 /// Options of every command.
 #[derive(Args, Clone, Debug)]
@@ -26,12 +28,48 @@ pub struct Everywhere {
     /// Replace existing outputs
     #[arg(long, global = true)]
     pub force: bool,
-    /// Units of length per pixel; without it lengths are in pixels
-    #[arg(long, global = true, value_name = "UNITS_PER_PIXEL", default_value_t = 1.0, value_parser = positive)]
+    /// Length of a pixel, with its unit (nm, um, mm, cm, m or in), such as 0.05mm; without it lengths are in pixels
+    #[arg(long = "scale", global = true, value_name = "LENGTH_PER_PIXEL", id = "scale")]
+    pub scale_given: Option<PixelLength>,
+    /// Unit of length, if --scale has none: nm, um, mm, cm, m or in
+    #[arg(long = "unit", global = true, value_name = "UNIT", id = "unit")]
+    pub unit_given: Option<LengthUnit>,
+    /// Length of a pixel; 1 if lengths are in pixels.
+    #[arg(skip = 1.0)]
     pub scale: f64,
+    /// Unit of length, if it is known.
+    #[arg(skip)]
+    pub unit: Option<LengthUnit>,
     /// How the program was invoked.
     #[arg(skip)]
     pub invocation: Invocation,
+}
+
+impl Everywhere {
+    /// Takes length of a pixel and unit from the options.
+    pub fn settle(&mut self) -> Result<(), Failure> {
+        let of_scale = self.scale_given.and_then(|scale| scale.unit);
+        if let (Some(of_scale), Some(unit)) = (of_scale, self.unit_given)
+            && of_scale != unit
+        {
+            return Err(Failure::usage(format!(
+                "--scale is in {of_scale}, but --unit is {unit}; give one of them"
+            )));
+        }
+        self.scale = self.scale_given.map_or(1.0, |scale| scale.length);
+        self.unit = of_scale.or(self.unit_given);
+        Ok(())
+    }
+
+    /// Refuses a unit for lengths in pixels.
+    pub fn refuse_unit_of_pixels(&self) -> Result<(), Failure> {
+        match (self.unit_given, self.scale_given) {
+            (Some(unit), None) => Err(Failure::usage(format!(
+                "--unit {unit} needs --scale, the length of a pixel in {unit}"
+            ))),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// How a command was invoked, so that a reader of its output can repeat it. It does not depend on folders or the number

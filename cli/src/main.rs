@@ -30,11 +30,11 @@ fn main() -> ExitCode {
         program.everywhere.invocation = invocation(&matches);
         program
     });
-    let program = match program {
+    let mut program = match program {
         Ok(program) => program,
         Err(error) => error.exit(),
     };
-    match run(&program) {
+    match program.everywhere.settle().and_then(|()| run(&program)) {
         Ok(code) => code,
         Err(failure) => {
             let failure = if progress::stopped() {

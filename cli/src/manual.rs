@@ -9,7 +9,9 @@ use crate::warnings::CODES;
 
 /// Conventions of all commands, for `docs/cli.md`.
 const CONVENTIONS: &str = "\
-- Lengths are pixels unless `--scale UNITS_PER_PIXEL` is given; meshes are in mesh units.
+- Lengths are pixels unless `--scale LENGTH_PER_PIXEL` is given, with its unit (`--scale 0.05mm`) or without; units are nm, um, mm, cm, m and in. Answers, tables, \
+reports and voxel files state the unit. Meshes are in the unit of their file.
+- Tables of `segment` begin with lines `# key=value` (area, min_size, unit, edge_rule, width, height), from which `unfold` takes what it needs.
 - A `profile` is the section of one particle by a plane. Its `size` is its equivalent circular diameter: the diameter of the circle of equal area. The size \
 of a particle is the equivalent circular diameter of its largest section, so a sphere's size is its diameter.
 - Size bins are (a, b]: N equal bins of (0, max-size] by `--bins N`, or `--edges a,b,...`, or `--spacing geometric`.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use stereology::files::{particle_table, vtp, xyz};
+use stereology::grid::LengthUnit;
 use stereology::shape::Arrangement;
 
 use crate::failure::{Explain, Failure};
@@ -33,9 +34,9 @@ impl ParticleFormat {
     }
 
     /// Writes the particles, completely or not at all.
-    pub fn write(self, path: &Path, arrangement: &Arrangement) -> Result<(), Failure> {
+    pub fn write(self, path: &Path, arrangement: &Arrangement, unit: Option<LengthUnit>) -> Result<(), Failure> {
         match self {
-            Self::Csv => particle_table::write(path, arrangement.particles()),
+            Self::Csv => particle_table::write(path, arrangement.particles(), unit),
             Self::Xyz => xyz::write(path, arrangement),
             Self::Vtp => vtp::write(path, arrangement.particles()),
         }

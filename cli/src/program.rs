@@ -8,8 +8,8 @@ use clap::{ArgMatches, CommandFactory, Parser, Subcommand};
 
 use crate::answer::Answer;
 use crate::commands::{
-    carve, contact, displace, exemplar, explore, export, grow, kmatrix, measure, pack, pyramid, render, schema,
-    segment, shape, slice, synthesize, texture, unfold,
+    assemble, carve, contact, displace, exemplar, explore, export, grow, kmatrix, measure, pack, pyramid, render,
+    schema, segment, shape, slice, synthesize, texture, unfold,
 };
 use crate::everywhere::{Everywhere, Invocation};
 use crate::failure::Failure;
@@ -26,7 +26,7 @@ const STYLES: Styles = Styles::styled()
 /// and the texture of the photograph. The result is a solid that can be sectioned anywhere.
 ///
 /// All steps at once:    stereology synthesize photo.jpg -o out
-/// Step by step:         segment -> unfold (kmatrix) -> pack -> texture
+/// Step by step:         segment -> unfold (kmatrix) -> pack -> texture -> assemble
 /// On a finished solid:  slice, render, export, carve
 /// Without particles:    exemplar, grow, measure
 /// Reliefs on meshes:    contact, displace, explore
@@ -63,6 +63,7 @@ pub enum Command {
     Texture(texture::Texture),
     Pyramid(pyramid::Pyramid),
     Shape(shape::Shape),
+    Assemble(assemble::Assemble),
     Slice(slice::Slice),
     Render(render::Render),
     Export(export::Export),
@@ -91,6 +92,7 @@ impl Command {
             Self::Texture(options) => options.run(everywhere).map(Some),
             Self::Pyramid(options) => options.run(everywhere).map(Some),
             Self::Shape(options) => options.run(everywhere).map(Some),
+            Self::Assemble(options) => options.run(everywhere).map(Some),
             Self::Slice(options) => options.run(everywhere).map(Some),
             Self::Render(options) => options.run(everywhere).map(Some),
             Self::Export(options) => options.run(everywhere).map(Some),
@@ -109,7 +111,7 @@ impl Command {
 }
 
 /// Options that do not affect output files.
-const WITHOUT_EFFECT: [&str; 7] = ["json", "threads", "quiet", "strict", "force", "output", "help"];
+const WITHOUT_EFFECT: [&str; 8] = ["json", "threads", "quiet", "strict", "force", "output", "from", "help"];
 
 /// The invocation in the matches of the whole program.
 pub fn invocation(matches: &ArgMatches) -> Invocation {

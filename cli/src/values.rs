@@ -3,11 +3,45 @@
 
 use std::str::FromStr;
 
+use stereology::grid::LengthUnit;
+
 /// A finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("a finite number above zero is needed".to_owned()),
+    }
+}
+
+/// The length of a pixel, with its unit if it is given: `0.05` or `0.05mm`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelLength {
+    /// Length.
+    pub length: f64,
+    /// Its unit.
+    pub unit: Option<LengthUnit>,
+}
+
+impl FromStr for PixelLength {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        if let Ok(length) = positive(text) {
+            return Ok(Self { length, unit: None });
+        }
+        // The number ends before the letters of the unit; `e` may belong to either.
+        let end = text
+            .rfind(|letter: char| letter.is_ascii_digit() || letter == '.')
+            .map_or(0, |last| last + 1);
+        let (number, unit) = text.split_at(end);
+        let length = positive(number)
+            .map_err(|error| format!("{error}, with a unit of length or without, such as 0.05mm or 0.05"))?;
+        let unit = unit.parse::<LengthUnit>().map_err(|error| error.to_string())?;
+        Ok(Self {
+            length,
+            unit: Some(unit),
+        })
     }
 }
 
@@ -309,7 +343,8 @@ pub fn shares(shapes: &[ShapeShare]) -> Result<Vec<f64>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BinderArgument, Edges, Extent, ShapeShare, Triple, positive, shares};
+    use super::{BinderArgument, Edges, Extent, PixelLength, ShapeShare, Triple, positive, shares};
+    use stereology::grid::LengthUnit;
 
     #[test]
     fn numbers_are_finite_and_in_range() {
@@ -317,6 +352,18 @@ mod tests {
             assert!(positive(wrong).is_err(), "{wrong}");
         }
         assert_eq!(positive("1e3"), Ok(1000.0));
+    }
+
+    #[test]
+    fn a_pixel_has_a_length_with_or_without_unit() {
+        let parse = |text: &str| text.parse::<PixelLength>().map(|of| (of.length, of.unit));
+        assert_eq!(parse("0.05"), Ok((0.05, None)));
+        assert_eq!(parse("0.05mm"), Ok((0.05, Some(LengthUnit::Millimetre))));
+        assert_eq!(parse("2e-3 µm"), Ok((0.002, Some(LengthUnit::Micrometre))));
+        assert_eq!(parse("1in"), Ok((1.0, Some(LengthUnit::Inch))));
+        for wrong in ["mm", "-1mm", "0mm", "1 furlong", "1e400m", ""] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

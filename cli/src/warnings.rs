@@ -127,6 +127,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Nothing for measurements on the surface; otherwise correct their positions.",
     ),
     (
+        "merged-category",
+        "No profile of a colour category is above the detection limit: its particles are counted in the nearest category.",
+        "Nothing, or give fewer --categories.",
+    ),
+    (
         "mesh-repaired",
         "The mesh was not quite a closed surface and was repaired.",
         "Read `repairs`; repair the mesh yourself if they are not intended.",

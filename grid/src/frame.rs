@@ -6,6 +6,7 @@
 use crate::element::Element;
 use crate::format::Format;
 use crate::volume_shape::VolumeShape;
+use crate::voxel_size::VoxelSize;
 use crate::{dream3d, npy, nrrd, tiff_stack, vti};
 
 /// The bytes around the samples.
@@ -17,13 +18,13 @@ pub(crate) struct Frame {
 
 impl Frame {
     /// The frame of a volume of `bytes` bytes; `None` for a format that is not one file of raw samples.
-    pub(crate) fn of<T: Element>(format: Format, shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> Option<Self> {
+    pub(crate) fn of<T: Element>(format: Format, shape: &VolumeShape, size: &VoxelSize, bytes: u64) -> Option<Self> {
         let (head, tail) = match format {
             Format::Npy => (npy::header::<T>(shape), Vec::new()),
-            Format::Nrrd => (nrrd::header::<T>(shape, spacing), Vec::new()),
-            Format::Vti => (vti::header::<T>(shape, spacing, bytes), vti::FOOTER.to_vec()),
-            Format::Tiff => tiff_stack::frame::<T>(shape, spacing, bytes),
-            Format::Hdf5 => (dream3d::head::<T>(shape, spacing, bytes), Vec::new()),
+            Format::Nrrd => (nrrd::header::<T>(shape, size), Vec::new()),
+            Format::Vti => (vti::header::<T>(shape, size, bytes), vti::FOOTER.to_vec()),
+            Format::Tiff => tiff_stack::frame::<T>(shape, size, bytes),
+            Format::Hdf5 => (dream3d::head::<T>(shape, size.sides, bytes), Vec::new()),
             Format::Zarr => return None,
         };
         Some(Self { head, tail })

@@ -17,6 +17,9 @@
 //! | [`Format::Hdf5`] | DREAM.3D's image geometry with one cell array (nz, ny, nx, channels): `rgb`, `FeatureIds` of `u32` (as i32: below 2³¹), else `values` | DREAM.3D, h5py |
 //! | [`Format::Zarr`] | OME-Zarr 0.5, arrays (channel, z, y, x) of halved resolutions, 32³ chunks in shards; colours and distances are averaged, ids and categories subsampled | napari, zarr-python |
 //!
+//! The unit of length ([`LengthUnit`]) is stored as `space units` in NRRD, as a field `unit` in VTK, as the resolution
+//! unit in TIFF (inch or centimetre, to which lengths are converted) and as the unit of the axes in OME-Zarr.
+//!
 //! Voxels are cells, not points: voxel (i, j, k) covers [i, i+1] × [j, j+1] × [k, k+1] times the spacing. In VTK they
 //! are cell data, so ids are never interpolated between particles.
 //!
@@ -74,6 +77,7 @@ mod format;
 mod frame;
 mod framed;
 mod hdf5;
+mod length_unit;
 mod npy;
 mod nrrd;
 #[cfg(feature = "read")]
@@ -87,6 +91,7 @@ mod slabs;
 mod tiff_reader;
 mod tiff_stack;
 mod volume_shape;
+mod voxel_size;
 mod vti;
 mod write_volume;
 mod zarr;
@@ -95,10 +100,12 @@ pub use atomic::write_atomically;
 pub use element::Element;
 pub use error::GridError;
 pub use format::Format;
+pub use length_unit::{LengthUnit, LengthUnitError};
 pub use npy::read_npy;
 #[cfg(feature = "read")]
 pub use read_volume::{StoredVolume, read_volume};
 #[cfg(feature = "read")]
 pub use sample_type::SampleType;
 pub use volume_shape::VolumeShape;
+pub use voxel_size::VoxelSize;
 pub use write_volume::{resume_volume, write_volume};

@@ -5,10 +5,13 @@
 //! samples of all pages without a gap.
 
 use crate::element::Element;
+use crate::length_unit::LengthUnit;
 use crate::volume_shape::VolumeShape;
+use crate::voxel_size::VoxelSize;
 
 /// The bytes before and after the samples: of a standard TIFF, or of a BigTIFF if 32-bit offsets do not suffice.
-pub(crate) fn frame<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u64) -> (Vec<u8>, Vec<u8>) {
+pub(crate) fn frame<T: Element>(shape: &VolumeShape, size: &VoxelSize, bytes: u64) -> (Vec<u8>, Vec<u8>) {
+    let resolution = Resolution::of(size);
     // A page's directory takes some 300 bytes.
     let big = bytes.saturating_add(1024 * shape.nz as u64) > u64::from(u32::MAX);
     let kind = Kind { big };
@@ -24,18 +27,53 @@ pub(crate) fn frame<T: Element>(shape: &VolumeShape, spacing: [f64; 3], bytes: u
     for z in 0..shape.nz {
         let at = directories + (tail.len() as u64 - (directories - start - bytes));
         let mut page = Directory::default();
-        page.describe::<T>(kind, shape, spacing, start + z as u64 * slab, slab);
+        page.describe::<T>(kind, shape, &resolution, start + z as u64 * slab, slab);
         if z == 0 {
-            page.add(IMAGE_DESCRIPTION, ASCII, description(shape.nz, spacing[2]));
+            page.add(IMAGE_DESCRIPTION, ASCII, description(shape.nz, &resolution));
         }
         tail.extend(page.written(kind, at, z + 1 == shape.nz));
     }
     (head, tail)
 }
 
-/// The description from which ImageJ reads the number of slices and their spacing.
-fn description(slices: usize, spacing: f64) -> Vec<u8> {
-    format!("ImageJ=1.54f\nimages={slices}\nslices={slices}\nspacing={spacing}\nloop=false\n\0").into_bytes()
+/// The description from which ImageJ reads the number of slices, their spacing and its unit.
+fn description(slices: usize, resolution: &Resolution) -> Vec<u8> {
+    let Resolution { spacing, name, .. } = resolution;
+    let unit = name.map_or(String::new(), |name| format!("unit={name}\n"));
+    let spacing = spacing[2];
+    format!("ImageJ=1.54f\nimages={slices}\nslices={slices}\n{unit}spacing={spacing}\nloop=false\n\0").into_bytes()
+}
+
+/// The size of a voxel in a unit that TIFF knows, so that all readers agree.
+struct Resolution {
+    spacing: [f64; 3],
+    /// 1: no unit, 2: inch, 3: centimetre.
+    tag: u16,
+    name: Option<&'static str>,
+}
+
+impl Resolution {
+    fn of(size: &VoxelSize) -> Self {
+        match size.unit {
+            None => Self {
+                spacing: size.sides,
+                tag: 1,
+                name: None,
+            },
+            Some(LengthUnit::Inch) => Self {
+                spacing: size.sides,
+                tag: 2,
+                name: Some("inch"),
+            },
+            Some(unit) => Self {
+                spacing: size
+                    .sides
+                    .map(|side| side / (LengthUnit::Centimetre.in_metres() / unit.in_metres())),
+                tag: 3,
+                name: Some("cm"),
+            },
+        }
+    }
 }
 
 const IMAGE_WIDTH: u16 = 256;
@@ -93,7 +131,7 @@ impl Directory {
         self.entries.push((tag, kind, value));
     }
 
-    fn describe<T: Element>(&mut self, kind: Kind, shape: &VolumeShape, spacing: [f64; 3], at: u64, bytes: u64) {
+    fn describe<T: Element>(&mut self, kind: Kind, shape: &VolumeShape, resolution: &Resolution, at: u64, bytes: u64) {
         let VolumeShape { ny, nx, channels, .. } = *shape;
         let short = |value: u16| value.to_le_bytes().to_vec();
         let each = |value: u16| value.to_le_bytes().repeat(channels);
@@ -108,9 +146,9 @@ impl Directory {
         self.add(SAMPLES_PER_PIXEL, SHORT, short(if channels == 1 { 1 } else { 3 }));
         self.add(ROWS_PER_STRIP, LONG, long(ny));
         self.add(STRIP_BYTE_COUNTS, place, kind.offset(bytes));
-        self.add(X_RESOLUTION, RATIONAL, per_unit(spacing[0]));
-        self.add(Y_RESOLUTION, RATIONAL, per_unit(spacing[1]));
-        self.add(RESOLUTION_UNIT, SHORT, short(1));
+        self.add(X_RESOLUTION, RATIONAL, per_unit(resolution.spacing[0]));
+        self.add(Y_RESOLUTION, RATIONAL, per_unit(resolution.spacing[1]));
+        self.add(RESOLUTION_UNIT, SHORT, short(resolution.tag));
         self.add(SAMPLE_FORMAT, SHORT, each(T::TIFF_SAMPLE));
     }
 

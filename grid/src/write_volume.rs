@@ -8,6 +8,7 @@ use crate::format::Format;
 use crate::frame::Frame;
 use crate::slabs::Slabs;
 use crate::volume_shape::VolumeShape;
+use crate::voxel_size::VoxelSize;
 use crate::{framed, zarr};
 use ndarray::ArrayViewMut3;
 use std::ops::ControlFlow;
@@ -16,8 +17,8 @@ use std::path::Path;
 /// Writes a volume whose slabs `fill` computes.
 ///
 /// `fill(z, slab)` is called for z = 0, 1, ..., nz − 1 with a view (y, x, channel). At first the view holds zeros,
-/// later the samples of an earlier slab. `spacing` is the size of a voxel along x, y, z in a unit of length of your
-/// choice; .npy does not store it. One slab is written while the next is computed. Memory: two slabs; for Zarr 32 more,
+/// later the samples of an earlier slab. `size` is the size of a voxel along x, y, z, with its unit if it has one; .npy
+/// stores neither, HDF5 no unit. One slab is written while the next is computed. Memory: two slabs; for Zarr 32 more,
 /// and 32 of each coarser resolution. The file appears under its name when it is complete.
 ///
 /// # Errors
@@ -45,10 +46,10 @@ pub fn write_volume<T: Element>(
     path: impl AsRef<Path>,
     format: Format,
     shape: VolumeShape,
-    spacing: [f64; 3],
+    size: impl Into<VoxelSize>,
     fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
 ) -> Result<(), GridError> {
-    write(path.as_ref(), format, shape, spacing, false, fill)
+    write(path.as_ref(), format, shape, size.into(), false, fill)
 }
 
 /// Writes a volume as [`write_volume`] does, but continues `FILE.partial` if it exists, and keeps it if the call is
@@ -86,17 +87,17 @@ pub fn resume_volume<T: Element>(
     path: impl AsRef<Path>,
     format: Format,
     shape: VolumeShape,
-    spacing: [f64; 3],
+    size: impl Into<VoxelSize>,
     fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
 ) -> Result<(), GridError> {
-    write(path.as_ref(), format, shape, spacing, true, fill)
+    write(path.as_ref(), format, shape, size.into(), true, fill)
 }
 
 fn write<T: Element>(
     path: &Path,
     format: Format,
     shape: VolumeShape,
-    spacing: [f64; 3],
+    size: VoxelSize,
     resume: bool,
     fill: impl FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>,
 ) -> Result<(), GridError> {
@@ -105,18 +106,18 @@ fn write<T: Element>(
     if !matches!(format, Format::Npy | Format::Nrrd | Format::Hdf5) && channels != 1 && channels != 3 {
         return Err(GridError::Channels { format, channels });
     }
-    if !spacing.iter().all(|s| s.is_finite() && *s > 0.0) {
-        return Err(GridError::Spacing { spacing });
+    if !size.sides.iter().all(|s| s.is_finite() && *s > 0.0) {
+        return Err(GridError::Spacing { spacing: size.sides });
     }
     let held = if resume { bytes_in(&partial_name(path)) } else { 0 };
     // Checked before the frame is built: the directories of a TIFF's pages, as many as slabs, would fill the memory.
     refuse_without_room(path, bytes.saturating_sub(held))?;
-    let frame = Frame::of::<T>(format, &shape, spacing, bytes);
+    let frame = Frame::of::<T>(format, &shape, &size, bytes);
     let around = frame.as_ref().map_or(0, Frame::length);
     refuse_without_room(path, bytes.saturating_add(around).saturating_sub(held))?;
     let slabs = Slabs::new(shape, slab_bytes, fill)?;
     match frame {
-        None => zarr::write(path, &shape, spacing, resume, slabs),
+        None => zarr::write(path, &shape, &size, resume, slabs),
         Some(frame) => framed::write(path, &frame, slab_bytes, resume, slabs),
     }
 }

@@ -14,6 +14,7 @@ use crate::element::Element;
 use crate::error::GridError;
 use crate::slabs::Slabs;
 use crate::volume_shape::VolumeShape;
+use crate::voxel_size::VoxelSize;
 use levels::Level;
 use ndarray::ArrayViewMut3;
 use shard::CHUNK;
@@ -26,14 +27,14 @@ use std::path::{Path, PathBuf};
 pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
     path: &Path,
     shape: &VolumeShape,
-    spacing: [f64; 3],
+    size: &VoxelSize,
     resume: bool,
     mut slabs: Slabs<T, F>,
 ) -> Result<(), GridError> {
     let folder = PartialFolder::open(path, resume)?;
     let mut levels = Level::<T>::all(&folder.partial, shape);
     let shapes: Vec<VolumeShape> = levels.iter().map(|level| level.shape).collect();
-    let root = metadata::group(&shapes, shape, spacing);
+    let root = metadata::group(&shapes, shape, size);
     let done = if resume {
         whole_slabs(&folder.partial, &root, &levels[0], &mut slabs)?
     } else {

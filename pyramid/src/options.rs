@@ -283,6 +283,18 @@ pub struct TextureReport {
 }
 
 impl TextureReport {
+    /// A report without findings, for a texture that is read from a file.
+    #[must_use]
+    pub fn recorded(levels: usize, band_errors: Vec<f64>, slice_errors: Vec<f64>, final_error: f64) -> Self {
+        Self {
+            levels,
+            band_errors,
+            slice_errors,
+            final_error,
+            findings: Vec::new(),
+        }
+    }
+
     /// Whether more iterations would change little: the last error is below .01, or more than .8 times the smallest of
     /// the earlier errors.
     ///

@@ -1,6 +1,7 @@
 //! The report of a synthesis: its numbers and images.
 
 use image::RgbImage;
+use stereology::grid::LengthUnit;
 use stereology::kmatrix::Sizes;
 use stereology::pipeline::{Comparison, ParticleTypes, Synthesis};
 use stereology::unfold::Interval;
@@ -28,6 +29,8 @@ pub struct Invocation {
     pub command: String,
     /// Every parameter with its value.
     pub parameters: Vec<(String, String)>,
+    /// Unit of all lengths, if it is known.
+    pub unit: Option<LengthUnit>,
 }
 
 impl SynthesisReport {
@@ -43,7 +46,12 @@ impl SynthesisReport {
         let pixel = synthesis.details.residual.voxel;
         Self {
             photo_name: invocation.photo_name,
-            unit: if (pixel - 1.0).abs() < 1e-12 { "px" } else { "units" }.to_owned(),
+            unit: match invocation.unit {
+                Some(unit) => unit.printed(),
+                None if (pixel - 1.0).abs() < 1e-12 => "px",
+                None => "units",
+            }
+            .to_owned(),
             command: invocation.command,
             parameters: invocation.parameters,
             remarks,

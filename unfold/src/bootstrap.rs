@@ -156,6 +156,6 @@ pub(crate) fn slices_drawn(bootstrap: &Bootstrap, slices: Option<usize>) -> Resu
 }
 
 /// A Poisson number; zero for a mean that is zero.
-fn poisson(mean: f64, rng: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn poisson(mean: f64, rng: &mut ChaCha8Rng) -> f64 {
     Poisson::new(mean).map_or(0.0, |distribution| distribution.sample(rng))
 }

@@ -75,6 +75,7 @@
 
 mod bootstrap;
 mod capping;
+mod category_labels;
 mod cholesky;
 mod estimate;
 mod estimator;
@@ -103,6 +104,7 @@ mod unfolding;
 mod unknown_fractions;
 
 pub use capping::capped_kernel;
+pub use category_labels::{CategoryDensity, CategoryModel, CategoryUnfolding, category_fractions, unfold_categories};
 pub use estimate::{CrossCheck, Estimate, Interval};
 pub use findings::with_cure;
 pub use grid::{fitting_edges, fitting_profile_edges};

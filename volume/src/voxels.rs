@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::slice::ChunksExactMut;
 use std::str::FromStr;
-use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
+use stereology_grid::{Element, Format, GridError, LengthUnit, VolumeShape, VoxelSize, resume_volume, write_volume};
 use stereology_metrics::Progress;
 
 /// Rows processed together: enough to share the particles they meet, few enough to distribute among threads.
@@ -64,6 +64,8 @@ pub struct VoxelGrid {
     pub counts: [usize; 3],
     /// Edges of a voxel along x, y, z: side / count, so they may differ a little where the box is not cubic.
     pub spacing: [f64; 3],
+    /// Unit of length of the spacing, for the formats that store one.
+    pub unit: Option<LengthUnit>,
     /// A colour is the mean over this many points along each axis of its voxel (a box filter); 1: the colour of its
     /// centre.
     pub samples: usize,
@@ -75,6 +77,14 @@ impl VoxelGrid {
     pub fn shape(&self, channels: usize) -> VolumeShape {
         let [nx, ny, nz] = self.counts;
         VolumeShape { nz, ny, nx, channels }
+    }
+
+    /// Size of a voxel, with its unit.
+    fn size(&self) -> VoxelSize {
+        VoxelSize {
+            sides: self.spacing,
+            unit: self.unit,
+        }
     }
 
     /// Centre of voxel (i, j, k) along x, y, z.
@@ -124,6 +134,7 @@ impl Solid {
         VoxelGrid {
             counts,
             spacing: [0, 1, 2].map(|k| sides[k] / counts[k] as f64),
+            unit: None,
             samples: 1,
         }
     }
@@ -328,9 +339,9 @@ impl VoxelFile<'_> {
             (self.progress)((z + 1) as f64 / shape.nz as f64)
         };
         if self.resume {
-            resume_volume(self.path, self.format, shape, self.grid.spacing, slab)
+            resume_volume(self.path, self.format, shape, self.grid.size(), slab)
         } else {
-            write_volume(self.path, self.format, shape, self.grid.spacing, slab)
+            write_volume(self.path, self.format, shape, self.grid.size(), slab)
         }
     }
 }

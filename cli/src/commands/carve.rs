@@ -6,24 +6,26 @@ use clap::Args;
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::Serialize;
+use stereology::files::solid::SavedSolid;
 use stereology::shape::{TriangleMesh, read_mesh, write_coloured_mesh, write_textured_mesh};
 use stereology::volume::{BakeOptions, CarveError, CarveOptions, Solid, turned};
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::commands::render::Placement;
-use crate::commands::slice::open_solid;
+use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_file;
 use crate::progress::Step;
 use crate::values::{count, positive};
 use crate::warnings::Warning;
-use stereology_report::counted;
+use stereology_report::{counted, significant};
 
 /// Carves a mesh from a finished solid and writes it with the solid's texture as vertex colours
 ///
-/// DIR is an output folder of `stereology synthesize`. The longest side of the mesh (.obj, .stl, .ply) spans one period
-/// of the solid, unless --period gives another length; its coordinates are kept. Triangles are bisected until linear
+/// DIR is an output folder of `stereology synthesize` or `assemble`, or a packing.json. The longest side of the mesh
+/// (.obj, .stl, .ply) spans one period of the solid, unless --period gives another length; its coordinates are kept,
+/// except in a .glb of a solid with a unit of length, which is in metres. Triangles are bisected until linear
 /// interpolation along every edge reproduces the colours, until edges are as short as a pixel of the photograph, or
 /// until there are --triangles of them. .glb opens in Blender, three.js and Windows; .ply in MeshLab and Blender.
 ///
@@ -34,7 +36,7 @@ use stereology_report::counted;
     after_long_help = "Example: stereology carve out bunny.obj -o bunny.glb\n         stereology carve out crate.obj --atlas 2048 -o crate.glb"
 )]
 pub struct Carve {
-    /// Folder of a solid, written by `stereology synthesize`
+    /// Folder of a solid, written by `stereology synthesize` or `assemble`, or a packing.json
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
     /// Mesh to carve: any triangles, closed or not
@@ -94,17 +96,21 @@ impl Carve {
             return Err(Failure::usage("with --atlas, -o needs a file that ends in .glb"));
         }
         check_file(&self.output, everywhere.force)?;
-        let solid = open_solid(&self.solid)?.solid;
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
         let mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         let placement = Placement::of(&mesh, &solid, self.period);
+        // glTF prescribes metres.
+        let metres = unit
+            .filter(|_| ends_in("glb"))
+            .map(|unit| placement.scale() * unit.in_metres());
         let place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync) = if self.turned {
             &|p| turned(&placement.apply(p))
         } else {
             &|p| placement.apply(p)
         };
         match self.atlas {
-            Some(pixels) => self.bake(&solid, &mesh, place, pixels, everywhere),
-            None => self.refine(&solid, &mesh, place, everywhere),
+            Some(pixels) => self.bake(&solid, &mesh, place, pixels, metres, everywhere),
+            None => self.refine(&solid, &mesh, place, metres, everywhere),
         }
     }
 
@@ -113,6 +119,7 @@ impl Carve {
         solid: &Solid,
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
+        metres: Option<f64>,
         everywhere: &Everywhere,
     ) -> Result<Answer, Failure> {
         let options = CarveOptions {
@@ -120,10 +127,11 @@ impl Carve {
             ..CarveOptions::default()
         };
         let step = Step::begin("carving", everywhere.quiet);
-        let carved = solid
+        let mut carved = solid
             .carve(mesh, place, &options, &|done| step.at(done))
             .map_err(|error| self.failure(error))?;
         drop(step);
+        let in_metres = in_metres(&mut carved.coloured.mesh, metres);
         write_coloured_mesh(&self.output, &carved.coloured).at(&self.output)?;
         let mesh = &carved.coloured.mesh;
         let mut notes = Notes::default();
@@ -132,6 +140,7 @@ impl Carve {
             counted(mesh.triangles.len() as u64),
             self.output.display()
         ));
+        notes.lines(in_metres);
         if carved.coarse_edges > 0 {
             notes.warn(Warning::new(
                 "coarse-texture",
@@ -158,6 +167,7 @@ impl Carve {
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
         pixels: u32,
+        metres: Option<f64>,
         everywhere: &Everywhere,
     ) -> Result<Answer, Failure> {
         let options = BakeOptions {
@@ -165,10 +175,11 @@ impl Carve {
             ..BakeOptions::default()
         };
         let step = Step::begin("baking", everywhere.quiet);
-        let baked = solid
+        let mut baked = solid
             .bake(mesh, place, &options, &|done| step.at(done))
             .map_err(|error| self.failure(error))?;
         drop(step);
+        let in_metres = in_metres(&mut baked.textured.mesh, metres);
         write_textured_mesh(&self.output, &baked.textured).at(&self.output)?;
         let mut notes = Notes::default();
         notes.line(format!(
@@ -177,6 +188,7 @@ impl Carve {
             counted(baked.charts as u64),
             self.output.display()
         ));
+        notes.lines(in_metres);
         if let Some(coarseness) = baked.coarseness.filter(|coarseness| *coarseness > COARSE) {
             notes.warn(Warning::new(
                 "coarse-texture",
@@ -202,6 +214,16 @@ impl Carve {
             error => Failure::run(format!("{}: {error}", self.mesh.display())),
         }
     }
+}
+
+/// Multiplies the coordinates by a length in metres, if it is known, and states that.
+fn in_metres(mesh: &mut TriangleMesh, metres: Option<f64>) -> Option<String> {
+    let metres = metres?;
+    mesh.vertices.iter_mut().for_each(|vertex| vertex.coords *= metres);
+    Some(format!(
+        "coordinates are in metres, as glTF prescribes: those of the mesh times {}",
+        significant(metres)
+    ))
 }
 
 /// Pixels of the photograph per pixel of the atlas from which detail is lost.

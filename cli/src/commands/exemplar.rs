@@ -12,7 +12,7 @@ use ndarray::{Array2, Array3, Axis};
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::exemplar::{self, Domain, Exemplar as Picture, Solid, SolidError, SolidOptions, synthesize_solid};
-use stereology::grid::{Element, Format, VolumeShape, write_volume};
+use stereology::grid::{Element, Format, VolumeShape, VoxelSize, write_volume};
 use stereology::segment::read_photo;
 
 use crate::answer::{Answer, Fields, Notes};
@@ -247,15 +247,17 @@ impl Exemplar {
         let scale = if pictures.phases { 1.0 } else { 255.0 };
         let (nz, ny, nx, channels) = solid.values.dim();
         let shape = VolumeShape { nz, ny, nx, channels };
-        write::<u8>(&self.output, format, shape, everywhere.scale, |z, y, x, channel| {
+        let voxel = VoxelSize {
+            sides: [everywhere.scale; 3],
+            unit: everywhere.unit,
+        };
+        write::<u8>(&self.output, format, shape, voxel, |z, y, x, channel| {
             (solid.values[[z, y, x, channel]] * scale).round().clamp(0.0, 255.0) as u8
         })?;
         if let Some(path) = &self.sources {
             let format = Format::from_path(path).or_usage("--sources")?;
             let shape = VolumeShape { channels: 1, ..shape };
-            write::<u32>(path, format, shape, everywhere.scale, |z, y, x, _| {
-                solid.sources[[z, y, x]]
-            })?;
+            write::<u32>(path, format, shape, voxel, |z, y, x, _| solid.sources[[z, y, x]])?;
         }
         let fields = self.fields(&mut notes, &solid, &pictures, &options, begin.elapsed().as_secs_f64());
         Answer::new(&fields, notes)
@@ -413,10 +415,10 @@ fn write<T: Element>(
     path: &Path,
     format: Format,
     shape: VolumeShape,
-    scale: f64,
+    voxel: VoxelSize,
     value: impl Fn(usize, usize, usize, usize) -> T,
 ) -> Result<(), Failure> {
-    write_volume::<T>(path, format, shape, [scale; 3], |z, mut slab| {
+    write_volume::<T>(path, format, shape, voxel, |z, mut slab| {
         for (y, mut row) in slab.axis_iter_mut(Axis(0)).enumerate() {
             for ((x, channel), slot) in row.indexed_iter_mut() {
                 *slot = value(z, y, x, channel);

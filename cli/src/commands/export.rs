@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::grid::Format;
+use stereology::files::solid::SavedSolid;
+use stereology::grid::{Format, LengthUnit};
 use stereology::volume::{self, VoxelGrid};
 
 use crate::answer::{Answer, Fields, Notes};
-use crate::commands::slice::open_solid;
+use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_volume;
@@ -18,10 +19,14 @@ use crate::values::count;
 
 /// Writes one period of a finished solid as voxels
 ///
-/// DIR is an output folder of `stereology synthesize`. The grid has N voxels along the box's longest side. Each voxel
-/// holds one channel: rgb (colour, u8), id (particle number, u32, 0 = binder), category (number of the colour category,
-/// u8, 0 = binder), distance (signed distance to the nearest particle surface, f32, negative inside) or alpha (mask,
-/// u8, 0 in voids). All formats store the same values; the axes are (z, y, x, channel).
+/// DIR is an output folder of `stereology synthesize` or `assemble`, or a packing.json. The grid has N voxels along the
+/// box's longest side. Each voxel holds one channel: rgb (colour, u8), id (particle number, u32, 0 = binder), category
+/// (number of the colour category, u8, 0 = binder), distance (signed distance to the nearest particle surface, f32,
+/// negative inside) or alpha (mask, u8, 0 in voids). All formats store the same values; the axes are (z, y, x,
+/// channel).
+///
+/// The unit of length of the solid is stored in .nrrd (space units), .vti (field `unit`), .tif (resolution per cm or
+/// inch) and .zarr (unit of the axes).
 ///
 /// .h5 is a DREAM.3D file (ids as FeatureIds). .zarr is an OME-Zarr 0.5 folder with axes (c, z, y, x), several
 /// resolutions and shards of 32 planes.
@@ -31,7 +36,7 @@ use crate::values::count;
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology export out --voxels 256 --channel rgb -o solid.nrrd")]
 pub struct Export {
-    /// Folder of a solid, written by `stereology synthesize`
+    /// Folder of a solid, written by `stereology synthesize` or `assemble`, or a packing.json
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
     /// Voxels along the box's longest side
@@ -79,8 +84,10 @@ fn samples(text: &str) -> Result<usize, String> {
 pub struct ExportFields {
     /// Voxels along z, y and x.
     shape: [usize; 3],
-    /// Side of a voxel along x, y and z, in units of length.
+    /// Side of a voxel along x, y and z.
     spacing: [f64; 3],
+    /// Unit of the sides; null if it is not known, or pixels of the photograph.
+    unit: Option<&'static str>,
     /// Content of the voxels: rgb, id, category, distance or alpha.
     channel: &'static str,
 }
@@ -93,7 +100,7 @@ impl Export {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let format = Format::from_path(&self.output).or_usage("-o")?;
         check_volume(&self.output, format, everywhere.force)?;
-        let solid = open_solid(&self.solid)?.solid;
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
         let (channel, name) = match self.channel {
             Channel::Rgb => (volume::Channel::Rgb, "rgb"),
             Channel::Id => (volume::Channel::Id, "id"),
@@ -105,6 +112,7 @@ impl Export {
         let progress = |done: f64| step.at(done);
         let grid = VoxelGrid {
             samples: self.samples,
+            unit,
             ..solid.voxel_grid(self.voxels)
         };
         if self.resume {
@@ -123,6 +131,7 @@ impl Export {
         let fields = ExportFields {
             shape: [nz, ny, nx],
             spacing: grid.spacing,
+            unit: unit.map(LengthUnit::symbol),
             channel: name,
         };
         Answer::new(&fields, notes)

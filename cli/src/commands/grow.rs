@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::exemplar::SolidError;
 use stereology::files::voxel_table::ValueRange;
-use stereology::grid::{Element, Format, SampleType, VolumeShape, read_volume, write_volume};
+use stereology::grid::{Element, Format, SampleType, VolumeShape, VoxelSize, read_volume, write_volume};
 use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels};
 use stereology::metrics::seams;
 use stereology::pipeline::finish_grown;
@@ -241,7 +241,10 @@ impl Grow {
             .map_err(|error| self.unfinished(&error))?;
         }
         go_on()?;
-        let spacing = [voxels.spacing; 3];
+        let spacing = VoxelSize {
+            sides: [voxels.spacing; 3],
+            unit: everywhere.unit,
+        };
         if image.is_bytes {
             write(&self.output, format, spacing, &grown.values.mapv(|v| v as u8))?;
         } else {
@@ -498,7 +501,7 @@ pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
     ClosedMesh::try_from(ball.mapped(|p| nalgebra::Point3::new(axes[0] * p.x, axes[1] * p.y, axes[2] * p.z))).or_fail()
 }
 
-fn write<T: Element>(path: &Path, format: Format, spacing: [f64; 3], samples: &Array4<T>) -> Result<(), Failure> {
+fn write<T: Element>(path: &Path, format: Format, spacing: VoxelSize, samples: &Array4<T>) -> Result<(), Failure> {
     let (nz, ny, nx, channels) = samples.dim();
     let shape = VolumeShape { nz, ny, nx, channels };
     write_volume::<T>(path, format, shape, spacing, |z, mut slab| {

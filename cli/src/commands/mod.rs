@@ -1,5 +1,6 @@
 //! The commands, one module each.
 
+pub mod assemble;
 pub mod carve;
 pub mod contact;
 pub mod displace;
@@ -17,6 +18,7 @@ pub mod schema;
 pub mod segment;
 pub mod shape;
 pub mod slice;
+mod solid_files;
 mod synthesis_verdict;
 pub mod synthesize;
 pub mod texture;

@@ -12,7 +12,8 @@ use stereology::anneal::{
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
 };
 use stereology::files::packing::PackingFile;
-use stereology::files::{densities, profiles};
+use stereology::files::{densities, profiles, table_head};
+use stereology::grid::LengthUnit;
 use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 
 use crate::answer::{Answer, Fields, Notes};
@@ -203,6 +204,8 @@ pub struct PackFields {
     /// Sides of the periodic box.
     #[serde(rename = "box")]
     sides: [f64; 3],
+    /// Unit of all lengths; null if it is not known.
+    unit: Option<&'static str>,
     /// Fraction of the volume inside particles.
     fraction: f64,
     /// The fraction that was requested.
@@ -259,6 +262,7 @@ impl Pack {
             check_file(path, everywhere.force)?;
         }
         let started = Instant::now();
+        let unit = self.unit(everywhere)?;
         let Shapes { names, shares, bodies } = self.shapes()?;
         let Population {
             grains,
@@ -277,7 +281,7 @@ impl Pack {
         drop(step);
         go_on()?;
         for (path, format) in also {
-            format.write(path, &packing)?;
+            format.write(path, &packing, unit)?;
         }
         if let Some(path) = &self.surfaces {
             particle_surfaces::write(path, packing.bodies(), packing.particles())?;
@@ -289,6 +293,7 @@ impl Pack {
             write_text(path, &pack_quality::trace(&packing))?;
         }
         PackingFile::new(names, packing.particles(), packing.period())
+            .with_unit(unit)
             .write(&self.output)
             .at(&self.output)?;
 
@@ -319,6 +324,7 @@ impl Pack {
         let fields = PackFields {
             particles: packing.particles().len(),
             sides,
+            unit: unit.map(LengthUnit::symbol),
             fraction: packing.fraction(),
             requested_fraction: self.fraction.unwrap_or(requested),
             max_overlap: packing.max_overlap(),
@@ -332,6 +338,24 @@ impl Pack {
                 .then(|| pack_quality::quality(&packing, everywhere.seed, &mut notes)),
         };
         Answer::new(&fields, notes)
+    }
+
+    /// The unit of the table of sizes or densities, or of the options.
+    fn unit(&self, everywhere: &Everywhere) -> Result<Option<LengthUnit>, Failure> {
+        let Some(table) = self.sizes.densities.as_ref().or(self.sizes.sizes.as_ref()) else {
+            return Ok(everywhere.unit);
+        };
+        match (table_head::read(table).or_fail()?.unit.unit(), everywhere.unit) {
+            (Some(stated), Some(given)) if stated != given => Err(Failure::run(format!(
+                "--unit {given} contradicts unit={stated} in the head of {}; leave the option out, or correct the table",
+                table.display()
+            ))),
+            (Some(stated), _) if everywhere.scale_given.is_some() => Err(Failure::run(format!(
+                "--scale contradicts {}: its lengths are in {stated} already (unit={stated})",
+                table.display()
+            ))),
+            (stated, given) => Ok(stated.or(given)),
+        }
     }
 
     fn shapes(&self) -> Result<Shapes, Failure> {
@@ -370,7 +394,7 @@ impl Pack {
                 ));
             }
             let mut grains = Vec::new();
-            let rows = profiles::read(table).or_fail()?;
+            let rows = profiles::read(table).or_fail()?.rows;
             let drawn = mix(
                 &rows.iter().map(|row| row.size * scale).collect::<Vec<_>>(),
                 shares,

@@ -13,7 +13,7 @@ use stereology::shape::{TriangleMesh, read_mesh};
 use stereology::volume::{Solid, turned};
 
 use crate::answer::{Answer, Fields, Notes};
-use crate::commands::slice::open_solid;
+use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{check_file, write_png};
@@ -22,9 +22,9 @@ use crate::values::{Triple, count, not_negative, positive};
 
 /// Renders a finished solid: one period as a block, or a mesh carved from it
 ///
-/// DIR is an output folder of `stereology synthesize`. Without --mesh the block is rendered with three faces visible,
-/// as in the paper. The longest side of a mesh (.obj, .stl, .ply) spans one period of the solid, unless --period gives
-/// another length, and its surface shows the colours of the solid there.
+/// DIR is an output folder of `stereology synthesize` or `assemble`, or a packing.json. Without --mesh the block is
+/// rendered with three faces visible, as in the paper. The longest side of a mesh (.obj, .stl, .ply) spans one period
+/// of the solid, unless --period gives another length, and its surface shows the colours of the solid there.
 ///
 /// Light is traced from surface to surface. Images are free of noise at any number of samples; with 8 x 8 per pixel
 /// (--samples 8) they are unbiased.
@@ -33,7 +33,7 @@ use crate::values::{Triple, count, not_negative, positive};
     after_long_help = "Example: stereology render out --mesh bunny.obj --up y --camera 2,1.5,3 -o bunny.png\n         stereology render out --mesh bunny.obj --up y --turntable 72 -o bunny.png; ffmpeg -i bunny_%03d.png bunny.mp4"
 )]
 pub struct Render {
-    /// Folder of a solid, written by `stereology synthesize`
+    /// Folder of a solid, written by `stereology synthesize` or `assemble`, or a packing.json
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
     /// Mesh to carve and render
@@ -230,6 +230,11 @@ impl Placement {
                 scale: 1.0,
             }
         }
+    }
+
+    /// Length in the solid of a unit of the mesh.
+    pub fn scale(&self) -> f64 {
+        self.scale
     }
 
     /// Point of the solid at a point of the mesh.

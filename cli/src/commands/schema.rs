@@ -7,6 +7,7 @@ use clap::Args;
 use schemars::Schema;
 
 use crate::answer::{Fields, schema_of};
+use crate::commands::assemble::AssembleFields;
 use crate::commands::carve::CarveFields;
 use crate::commands::contact::ContactFields;
 use crate::commands::displace::DisplaceFields;
@@ -62,7 +63,7 @@ fn entry<T: Fields>() -> Entry {
     }
 }
 
-fn entries() -> [Entry; 18] {
+fn entries() -> [Entry; 19] {
     [
         entry::<SynthesizeFields>(),
         entry::<SegmentFields>(),
@@ -72,6 +73,7 @@ fn entries() -> [Entry; 18] {
         entry::<TextureFields>(),
         entry::<PyramidFields>(),
         entry::<ShapeFields>(),
+        entry::<AssembleFields>(),
         entry::<SliceFields>(),
         entry::<RenderFields>(),
         entry::<ExportFields>(),

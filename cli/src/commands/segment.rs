@@ -6,6 +6,8 @@ use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::files::profiles;
+use stereology::files::table_head::TableHead;
+use stereology::grid::LengthUnit;
 use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, read_photo_up_to, write_labels};
 
 use crate::answer::{Answer, Fields, Notes};
@@ -149,6 +151,7 @@ impl Segment {
         for path in &self.labels_out {
             check_file(path, everywhere.force)?;
         }
+        everywhere.refuse_unit_of_pixels()?;
         let folder = OutputFolder::begin(&self.output, everywhere.force)?;
         let read = read_photo_up_to(&self.photo, self.max_pixels).at(&self.photo)?;
         let (photo, mut findings) = (read.photo, read.findings);
@@ -191,11 +194,12 @@ impl Segment {
                 "look at            {}",
                 self.output.join("overlay.png").display()
             ));
-        write_files(&folder, &found, scale)?;
+        let head = profiles::head(&found, scale, everywhere.unit, options.edge_rule);
+        write_files(&folder, &found, scale, &head)?;
         for path in &self.labels_out {
             write_labels(path, found.labels.view()).at(path)?;
         }
-        let answer = Answer::new(&SegmentFields::of(&found, scale), notes)?;
+        let answer = Answer::new(&SegmentFields::of(&found, scale, everywhere.unit), notes)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
         folder.publish()?;
@@ -208,6 +212,8 @@ impl Segment {
 pub struct SegmentFields {
     /// Number of profiles found.
     profiles: usize,
+    /// Unit of all lengths; null if it is not known, or pixels.
+    unit: Option<&'static str>,
     /// Fraction of the area inside profiles.
     area_fraction: f64,
     /// Profiles per unit area.
@@ -228,15 +234,17 @@ pub struct SegmentFields {
     size_by_category: Option<TestFields>,
 }
 
-/// The examined area.
+/// The photograph and the examined area.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct WindowFields {
     /// Width of the photograph.
     width: f64,
     /// Height of the photograph.
     height: f64,
-    /// Area in which profiles are counted.
+    /// Area of the photograph.
     area: f64,
+    /// Area in which profiles are counted: that of the photograph less what the edge rule leaves out.
+    counted_area: f64,
 }
 
 /// A colour category.
@@ -266,8 +274,8 @@ impl Fields for SegmentFields {
 }
 
 impl SegmentFields {
-    /// The fields of a segmentation; lengths are multiplied by `scale`.
-    pub fn of(found: &Segmentation, scale: f64) -> Self {
+    /// The fields of a segmentation; lengths are multiplied by `scale` to be in `unit`.
+    pub fn of(found: &Segmentation, scale: f64, unit: Option<LengthUnit>) -> Self {
         let mean_size = |category: usize| {
             let sizes: Vec<f64> = found
                 .profiles
@@ -284,6 +292,7 @@ impl SegmentFields {
         });
         Self {
             profiles: found.profiles.len(),
+            unit: unit.map(LengthUnit::symbol),
             area_fraction: found.area_fraction,
             number_per_area: found.number_per_area / (scale * scale),
             min_size: found.min_size * scale,
@@ -291,7 +300,8 @@ impl SegmentFields {
             window: WindowFields {
                 width: found.window.width as f64 * scale,
                 height: found.window.height as f64 * scale,
-                area: found.window.area * scale * scale,
+                area: (found.window.width * found.window.height) as f64 * scale * scale,
+                counted_area: found.window.area * scale * scale,
             },
             counted: found.profiles.iter().filter(|profile| profile.weight > 0.0).count(),
             binder: found.binder.colour.map(|c| 255.0 * c),
@@ -306,10 +316,10 @@ impl SegmentFields {
 }
 
 /// Writes all files of a segmentation except the summary; lengths are multiplied by `scale`.
-pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64) -> Result<(), Failure> {
+pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64, head: &TableHead) -> Result<(), Failure> {
     let labels = folder.file("labels.tif");
     write_labels(&labels, found.labels.view()).at(&labels)?;
-    profiles::write(folder.file("profiles.csv"), found, scale).or_fail()?;
+    profiles::write(folder.file("profiles.csv"), found, scale, head).or_fail()?;
     for (name, picture) in [
         ("overlay.png", found.overlay()),
         ("binder.png", found.binder_image()),

@@ -1,15 +1,17 @@
 //! `stereology slice`: an image of a plane section through a solid.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::files::solid::{self, SavedSolid};
+use stereology::files::solid::SavedSolid;
+use stereology::grid::LengthUnit;
 use stereology::volume::{self, SlicePlane};
 
 use crate::answer::{Answer, Fields, Notes};
+use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{check_file, write_png};
@@ -19,13 +21,13 @@ use stereology_report::significant;
 
 /// Slices a finished solid with a plane and writes an image of the section
 ///
-/// DIR is an output folder of `stereology synthesize`. The plane is perpendicular to an --axis, at a fraction --at of
-/// the box's side (0.3 is 30 %), or it is given by a --normal and its --offset from the origin along the normal. The
-/// image shows one period of the solid.
+/// DIR is an output folder of `stereology synthesize` or `assemble`, or a packing.json. The plane is perpendicular to
+/// an --axis, at a fraction --at of the box's side (0.3 is 30 %), or it is given by a --normal and its --offset from
+/// the origin along the normal. The image shows one period of the solid.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology slice out --axis z --at 0.3 --size 512 -o cut.png")]
 pub struct Slice {
-    /// Folder of a solid, written by `stereology synthesize`
+    /// Folder of a solid, written by `stereology synthesize` or `assemble`, or a packing.json
     #[arg(value_name = "DIR")]
     pub solid: PathBuf,
     /// Axis perpendicular to the slice [default: z]
@@ -63,8 +65,10 @@ pub struct SliceFields {
     width: u32,
     /// Height of the image in pixels.
     height: u32,
-    /// Side of a pixel in units of length.
+    /// Side of a pixel.
     pixel: f64,
+    /// Unit of the side; null if it is not known, or pixels of the photograph.
+    unit: Option<&'static str>,
 }
 
 impl Fields for SliceFields {
@@ -74,7 +78,7 @@ impl Fields for SliceFields {
 impl Slice {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         check_file(&self.output, everywhere.force)?;
-        let solid = open_solid(&self.solid)?.solid;
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
         let sides = solid.period().sides();
         let (plane, [across, down]) = match self.normal {
             Some(Triple(normal)) => {
@@ -98,29 +102,19 @@ impl Slice {
         write_png(&self.output, &picture)?;
         let mut notes = Notes::default();
         notes.line(format!(
-            "{} x {} pixels with side {} written to {}",
+            "{} x {} pixels with side {}{} written to {}",
             picture.width(),
             picture.height(),
             significant(pixel),
+            unit.map_or(String::new(), |unit| format!(" {}", unit.printed())),
             self.output.display()
         ));
         let fields = SliceFields {
             width: picture.width(),
             height: picture.height(),
             pixel,
+            unit: unit.map(LengthUnit::symbol),
         };
         Answer::new(&fields, notes)
     }
-}
-
-/// Opens an output folder of `stereology synthesize`.
-pub fn open_solid(folder: &Path) -> Result<SavedSolid, Failure> {
-    let parts = ["solid.json", "packing.json", "texture.npy"];
-    if let Some(missing) = parts.iter().find(|part| !folder.join(part).is_file()) {
-        return Err(Failure::run(format!(
-            "{} contains no {missing}; give a folder written by `stereology synthesize`",
-            folder.display()
-        )));
-    }
-    solid::read(folder).at(folder)
 }

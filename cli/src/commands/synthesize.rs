@@ -10,10 +10,10 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use stereology::anneal::PackOptions;
 use stereology::files;
-use stereology::grid::Format;
+use stereology::grid::{Format, LengthUnit};
 use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{
-    self, Comparison, DensityError, Extent, ParticleTypes, PopulationFailure, Synthesis, SynthesisError,
+    self, Comparison, DensityError, Extent, Finished, ParticleTypes, PopulationFailure, Synthesis, SynthesisError,
     SynthesisOptions,
 };
 use stereology::pyramid::TextureReport;
@@ -27,7 +27,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::pack::pack_failure;
 use crate::commands::segment::SegmentFields;
 use crate::commands::synthesis_verdict::{OutlineFields, ShapeFields, VerdictFields};
-use crate::commands::unfold::{Defaults, UnfoldingFields, types};
+use crate::commands::unfold::{CategoryFields, Defaults, UnfoldingFields, types};
 use crate::commands::{pack, segment, texture, unfold};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
@@ -55,6 +55,10 @@ pub struct Synthesize {
     /// Photograph of a plane section [default: the built-in sample]
     #[arg(value_name = "PHOTO")]
     pub photo: Option<PathBuf>,
+    /// Take up the packing and the texture of an earlier run of `synthesize` where their inputs and options are the
+    /// same; the result is the same as without
+    #[arg(long, value_name = "DIR")]
+    pub from: Option<PathBuf>,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
@@ -117,6 +121,8 @@ const SECTIONS: [([f64; 3], f64); 2] = [([1.0, 2.0, 3.0], 0.37), ([-3.0, 2.0, 1.
 /// JSON of `stereology synthesize`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SynthesizeFields {
+    /// Unit of all lengths; null if it is not known, or pixels.
+    unit: Option<&'static str>,
     /// The segmentation of the photograph.
     segment: SegmentFields,
     /// The particles per volume.
@@ -138,6 +144,8 @@ pub struct SynthesizeFields {
 pub struct UnfoldedPhoto {
     #[serde(flatten)]
     all: UnfoldingFields,
+    /// Densities of each colour category, which sum to those of all particles.
+    by_category: Vec<CategoryFields>,
     /// Probability of such an association of size and colour if they are independent; null if there is one colour
     /// category.
     size_and_colour_p_value: Option<f64>,
@@ -257,6 +265,7 @@ impl Fields for SynthesizeFields {
 
 impl Synthesize {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
+        everywhere.refuse_unit_of_pixels()?;
         let mut options = self.options(everywhere)?;
         if self.solid.voxels > MOST_VOXELS {
             return Err(Failure::run(format!(
@@ -290,22 +299,32 @@ impl Synthesize {
             .transpose()?;
         let (labels, mut noticed) = labels.map_or((None, Vec::new()), |read| (Some(read.labels), read.findings));
         noticed.extend(findings);
+        let finished = match &self.from {
+            Some(earlier) => files::steps::read(earlier).at(earlier)?,
+            None => Finished::default(),
+        };
         let stages = Stages::begin(everywhere.quiet);
-        let synthesis = pipeline::synthesize(&photo, labels, &types, &options, &|step, done| {
+        let synthesis = pipeline::synthesize_from(&photo, labels, &types, &options, &finished, &|step, done| {
             stages.at(step.name(), done)
         })
         .map_err(|error| self.failure(error))?;
         go_on()?;
-        let mut answer = self.answer(&synthesis)?;
+        let mut answer = self.answer(&synthesis, everywhere)?;
         for finding in noticed {
             answer
                 .notes
                 .warn(crate::warnings::Warning::new(finding.code, finding.message));
         }
         self.write(&folder, &synthesis, &types, &name, everywhere, &stages)?;
+        files::steps::write(folder.file(""), &synthesis).or_fail()?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
         folder.publish()?;
+        if self.from.is_some() {
+            answer
+                .notes
+                .taken_up(synthesis.taken_up.iter().map(|step| step.name()).collect());
+        }
         let seconds: Map<String, Value> = stages
             .end()
             .into_iter()
@@ -393,14 +412,16 @@ impl Synthesize {
         }
     }
 
-    fn answer(&self, synthesis: &Synthesis) -> Result<Answer, Failure> {
+    fn answer(&self, synthesis: &Synthesis, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let (packing, population, verification) = (&synthesis.packing, &synthesis.population, &synthesis.verification);
         let pixel = synthesis.details.residual.voxel;
         let sides: [f64; 3] = packing.sides().into();
         let fields = SynthesizeFields {
-            segment: SegmentFields::of(&synthesis.segmentation, pixel),
+            unit: everywhere.unit.map(LengthUnit::symbol),
+            segment: SegmentFields::of(&synthesis.segmentation, pixel, everywhere.unit),
             unfold: UnfoldedPhoto {
                 all: UnfoldingFields::of(&synthesis.densities.all, self.unfold.kernel_name()),
+                by_category: CategoryFields::of(&synthesis.densities),
                 size_and_colour_p_value: Some(synthesis.densities.association.p_value).filter(|p| p.is_finite()),
             },
             pack: PackedPhoto {
@@ -464,9 +485,12 @@ impl Synthesize {
         stages: &Stages,
     ) -> Result<(), Failure> {
         let (solid, pixel) = (&synthesis.solid, everywhere.scale);
-        segment::write_files(folder, &synthesis.segmentation, pixel)?;
-        files::densities::write(folder.file("densities.csv"), &synthesis.densities).or_fail()?;
-        files::solid::write(folder.file(""), solid, &synthesis.details.residual, types).or_fail()?;
+        let unit = everywhere.unit;
+        let rule = self.segment.options(everywhere.seed).edge_rule;
+        let head = files::profiles::head(&synthesis.segmentation, pixel, unit, rule);
+        segment::write_files(folder, &synthesis.segmentation, pixel, &head)?;
+        files::densities::write(folder.file("densities.csv"), &synthesis.densities, unit).or_fail()?;
+        files::solid::write(folder.file(""), solid, Some(&synthesis.details.residual), types, unit).or_fail()?;
         solid
             .write_voxels(
                 folder.file("volume.npy"),
@@ -495,6 +519,7 @@ impl Synthesize {
             photo_name: name.to_owned(),
             command: everywhere.invocation.command.clone(),
             parameters: everywhere.invocation.parameters.clone(),
+            unit,
         };
         let report = SynthesisReport::new(synthesis, types, pictures, invocation, remarks.collect());
         write_text(&folder.file("report.html"), &synthesis_page(&report).or_fail()?)

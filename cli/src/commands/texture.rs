@@ -10,7 +10,7 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use ndarray::{Array3, Axis};
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::grid::{Format, VolumeShape, write_atomically, write_volume};
+use stereology::grid::{Format, VolumeShape, VoxelSize, write_atomically, write_volume};
 use stereology::pipeline::{image_texture_limits, texture_limits};
 use stereology::pyramid::{
     self, Exemplar, TextureOptions, TextureReport, synthesize_image_with_report, synthesize_oriented_volume,
@@ -268,7 +268,10 @@ impl Texture {
                     &self.output,
                     format,
                     VolumeShape { nz, ny, nx, channels },
-                    [everywhere.scale; 3],
+                    VoxelSize {
+                        sides: [everywhere.scale; 3],
+                        unit: everywhere.unit,
+                    },
                     |z, mut slab| {
                         slab.zip_mut_with(&made.index_axis(Axis(0), z), |byte, &value| *byte = stored(value));
                         if stopped() {

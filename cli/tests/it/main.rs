@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // a test that cannot set itself up should stop there
 
 mod bad_input;
+mod chain;
 mod contract;
 mod exemplars;
 mod packings;

@@ -73,6 +73,7 @@ fn a_small_photograph_becomes_a_solid() {
             "residual.png",
             "residual.tif",
             "solid.json",
+            "steps.json",
             "summary.json",
             "texture.npy",
             "volume.npy",

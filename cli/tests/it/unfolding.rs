@@ -87,10 +87,10 @@ fn edge_rules_name_the_columns_they_miss() {
     assert_eq!(found["profiles"], 2);
 }
 
-/// Two categories of one distribution: each and their sum are reported, although size and colour are independent;
+/// Two categories of one distribution: each has its fraction of the profiles, and they sum to all particles;
 /// densities.csv holds their rows.
 #[test]
-fn categories_are_unfolded_each_and_together() {
+fn categories_are_parts_of_one_density() {
     let folder = tempfile::tempdir().unwrap();
     let (table, output) = (path(&folder, "profiles.csv"), path(&folder, "densities.csv"));
     let rows: String = (0..300)
@@ -116,14 +116,14 @@ fn categories_are_unfolded_each_and_together() {
         "-o",
         &output,
     ]);
-    let of = found["categories"].as_array().unwrap();
+    let of = found["by_category"].as_array().unwrap();
     assert_eq!(
         (of.len(), &of[0]["category"], &of[1]["category"]),
         (2, &1.into(), &4.into())
     );
     let total = |value: &serde_json::Value| value["total"].as_f64().unwrap();
-    assert!((total(&of[0]) + total(&of[1]) - total(&found["categories_sum"])).abs() < 1e-9);
-    assert!((total(&found["categories_sum"]) / total(&found) - 1.0).abs() < 0.1);
+    assert!(((total(&of[0]) + total(&of[1])) / total(&found) - 1.0).abs() < 1e-9);
+    assert!((total(&of[0]) / total(&found) - 2.0 / 3.0).abs() < 1e-9);
     assert!(of[0]["total_lower"].as_f64().unwrap() < of[0]["total_upper"].as_f64().unwrap());
     let table = fs::read_to_string(&output).unwrap();
     assert_eq!(table.lines().count(), 1 + 3 * 4);

@@ -2,10 +2,12 @@
 
 use crate::element::Element;
 use crate::volume_shape::VolumeShape;
+use crate::voxel_size::VoxelSize;
 use crate::zarr::shard::CHUNK;
 
 /// Metadata of the folder: axes, resolutions with their spacing, and for colours the display of the channels.
-pub(crate) fn group(levels: &[VolumeShape], finest: &VolumeShape, spacing: [f64; 3]) -> String {
+pub(crate) fn group(levels: &[VolumeShape], finest: &VolumeShape, size: &VoxelSize) -> String {
+    let spacing = size.sides;
     let counts = |shape: &VolumeShape| [shape.nz, shape.ny, shape.nx];
     let datasets: Vec<String> = levels
         .iter()
@@ -33,7 +35,11 @@ pub(crate) fn group(levels: &[VolumeShape], finest: &VolumeShape, spacing: [f64;
     } else {
         String::new()
     };
-    let axes = r#"[{"name":"c","type":"channel"},{"name":"z","type":"space"},{"name":"y","type":"space"},{"name":"x","type":"space"}]"#;
+    let unit = size
+        .unit
+        .map_or(String::new(), |unit| format!(r#","unit":"{}""#, unit.udunits()));
+    let space = ["z", "y", "x"].map(|axis| format!(r#"{{"name":"{axis}","type":"space"{unit}}}"#));
+    let axes = format!(r#"[{{"name":"c","type":"channel"}},{}]"#, space.join(","));
     format!(
         "{{\"zarr_format\":3,\"node_type\":\"group\",\"attributes\":{{\"ome\":{{\"version\":\"0.5\",\"multiscales\":[{{\"name\":\"solid\",\"axes\":{axes},\"datasets\":[{}]}}]{omero}}}}}}}\n",
         datasets.join(",")

@@ -7,4 +7,5 @@ mod hdf5;
 #[cfg(feature = "read")]
 mod other_programs;
 mod resume;
+mod units;
 mod whole_or_nothing;

@@ -4,13 +4,14 @@
 
 use crate::files::FileError;
 use crate::pipeline::ParticleDensities;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
-use stereology_grid::write_atomically;
-use stereology_unfold::Unfolding;
+use stereology_grid::{LengthUnit, write_atomically};
+use stereology_unfold::Interval;
 
-/// Writes the densities of a solid: rows of all particles, then those of each category if there are several.
+/// Writes densities: rows of all particles, then those of each type and of each category if there are several. The
+/// rows of the categories sum to those of all particles.
 ///
 /// # Errors
 ///
@@ -27,18 +28,36 @@ use stereology_unfold::Unfolding;
 /// let options = DensityOptions { bins: 2, ..DensityOptions::default() };
 /// let found = unfold_profiles(&profiles, &ParticleTypes::parse(&["sphere"])?, &options, &|_| ControlFlow::Continue(()))?;
 /// let folder = tempfile::tempdir()?;
-/// densities::write(folder.path().join("densities.csv"), &found)?;
+/// densities::write(folder.path().join("densities.csv"), &found, None)?;
 /// let table = std::fs::read_to_string(folder.path().join("densities.csv"))?;
 /// assert_eq!(table.lines().count(), 1 + 2);
 /// assert!(table.lines().nth(2).is_some_and(|row| row.starts_with("2.5,5,")));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn write(path: impl AsRef<Path>, densities: &ParticleDensities) -> Result<(), FileError> {
-    let mut rows = DensityRows::default();
-    rows.unfolding(&densities.all, None, None);
-    if densities.by_category.len() > 1 {
-        for (category, number_density) in densities.by_category.iter().enumerate() {
-            rows.densities(&densities.all.edges, number_density, None, Some(category));
+pub fn write(path: impl AsRef<Path>, densities: &ParticleDensities, unit: Option<LengthUnit>) -> Result<(), FileError> {
+    let mut rows = DensityRows::new(unit);
+    let all = &densities.all;
+    rows.bins(&all.edges, &all.number_density, all.intervals.as_deref(), None, None);
+    for (kind, part) in densities.by_type.iter().enumerate() {
+        rows.bins(
+            &part.edges,
+            &part.number_density,
+            part.intervals.as_deref(),
+            Some(kind),
+            None,
+        );
+    }
+    let categories: BTreeSet<u8> = densities.by_category.iter().map(|part| part.category).collect();
+    if categories.len() > 1 {
+        for part in &densities.by_category {
+            let of = &part.density;
+            rows.bins(
+                &all.edges,
+                &of.number_density,
+                of.intervals.as_deref(),
+                part.kind,
+                Some(part.category),
+            );
         }
     }
     rows.write(path)
@@ -51,8 +70,8 @@ pub fn write(path: impl AsRef<Path>, densities: &ParticleDensities) -> Result<()
 /// ```
 /// use stereology::files::densities::DensityRows;
 ///
-/// let mut rows = DensityRows::default();
-/// rows.densities(&[0.0, 1.0, 2.0], &[None, Some(0.25)], Some(0), None); // no density in the first bin
+/// let mut rows = DensityRows::new(None);
+/// rows.bins(&[0.0, 1.0, 2.0], &[None, Some(0.25)], None, Some(0), None); // no density in the first bin
 /// let folder = tempfile::tempdir()?;
 /// rows.write(folder.path().join("densities.csv"))?;
 /// assert!(std::fs::read_to_string(folder.path().join("densities.csv"))?.ends_with("0,1,,,,0,\n1,2,0.25,,,0,\n"));
@@ -61,38 +80,33 @@ pub fn write(path: impl AsRef<Path>, densities: &ParticleDensities) -> Result<()
 #[derive(Clone, Debug, Default)]
 pub struct DensityRows {
     lines: Vec<String>,
+    unit: Option<LengthUnit>,
 }
 
 impl DensityRows {
-    /// Adds the bins of an unfolding with their intervals; `None` for a type or category means all together, an empty
-    /// field.
-    pub fn unfolding(&mut self, unfolding: &Unfolding, particle_type: Option<usize>, category: Option<usize>) {
-        let intervals = unfolding
-            .intervals
-            .clone()
-            .unwrap_or_else(|| vec![None; unfolding.number_density.len()]);
-        for (bin, interval) in intervals.iter().enumerate() {
-            let ends = interval.map(|interval| [interval.lower, interval.upper]);
-            self.row(
-                &unfolding.edges[bin..bin + 2],
-                unfolding.number_density[bin],
-                ends,
-                particle_type,
-                category,
-            );
+    /// No rows; lengths are in `unit`.
+    #[must_use]
+    pub fn new(unit: Option<LengthUnit>) -> Self {
+        Self {
+            lines: Vec::new(),
+            unit,
         }
     }
 
-    /// Adds bins without intervals.
-    pub fn densities(
+    /// Adds bins with their intervals, if there are any; `None` for a type or category means all together, an empty
+    /// field.
+    pub fn bins(
         &mut self,
         edges: &[f64],
         number_density: &[Option<f64>],
+        intervals: Option<&[Option<Interval>]>,
         particle_type: Option<usize>,
-        category: Option<usize>,
+        category: Option<u8>,
     ) {
-        for (edges, density) in edges.windows(2).zip(number_density) {
-            self.row(edges, *density, None, particle_type, category);
+        for (bin, (edges, density)) in edges.windows(2).zip(number_density).enumerate() {
+            let interval = intervals.and_then(|of| of[bin]);
+            let ends = interval.map(|interval| [interval.lower, interval.upper]);
+            self.row(edges, *density, ends, particle_type, category);
         }
     }
 
@@ -102,7 +116,7 @@ impl DensityRows {
         density: Option<f64>,
         ends: Option<[f64; 2]>,
         particle_type: Option<usize>,
-        category: Option<usize>,
+        category: Option<u8>,
     ) {
         let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
         let index = |value: Option<usize>| value.map(|v| v.to_string()).unwrap_or_default();
@@ -114,7 +128,7 @@ impl DensityRows {
             number(ends.map(|e| e[0])),
             number(ends.map(|e| e[1])),
             index(particle_type),
-            index(category)
+            index(category.map(usize::from))
         ));
     }
 
@@ -125,6 +139,9 @@ impl DensityRows {
     /// [`FileError`] if it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), FileError> {
         Ok(write_atomically(path, |out| {
+            if let Some(unit) = self.unit {
+                writeln!(out, "# unit={unit}")?;
+            }
             writeln!(out, "lower_edge,upper_edge,number_density,lower,upper,type,category")?;
             self.lines.iter().try_for_each(|line| writeln!(out, "{line}"))
         })?)
@@ -163,6 +180,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<DensityHistogram>, FileError> 
 fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
+        .comment(Some(b'#'))
         .from_path(path)
         .map_err(|error| format!("cannot be read ({error})"))?;
     let headers = reader.headers().map_err(|error| error.to_string())?.clone();

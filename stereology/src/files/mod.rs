@@ -6,10 +6,14 @@
 //! | module | file | content |
 //! |---|---|---|
 //! | [`profiles`] | `profiles.csv` | a table of profiles |
+//! | [`table_head`] | the first lines of a table | area, threshold, unit and edge rule of its rows |
 //! | [`densities`] | `densities.csv` | particles per volume by size bin, type and category |
 //! | [`packing`] | `packing.json` | particles in a periodic box |
+//! | [`steps`] | `steps.json` | finished steps, for another run |
 //! | [`solid`] | a folder | a packing with its colours and its residual |
+//! | [`texture_source`] | `texture.npy` or a volume | the texture of an assembled solid |
 //! | [`residual`] | `texture.npy` | the residual volume of a solid |
+//! | [`colour_table`] | CSV | colours of particles |
 //! | [`particle_table`] | CSV | particles, one per row |
 //! | [`xyz`] | extended XYZ | particles and box, for OVITO |
 //! | [`vtp`] | VTK poly data | particles as points, for ParaView |
@@ -18,12 +22,16 @@
 mod error;
 mod json;
 
+pub mod colour_table;
 pub mod densities;
 pub mod packing;
 pub mod particle_table;
 pub mod profiles;
 pub mod residual;
 pub mod solid;
+pub mod steps;
+pub mod table_head;
+pub mod texture_source;
 pub mod voxel_table;
 pub mod vtp;
 pub mod xyz;

@@ -4,6 +4,7 @@ use crate::files::{FileError, json};
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use stereology_grid::LengthUnit;
 use stereology_shape::{BoxError, Particle, PeriodicBox};
 
 /// `packing.json`: particles in a periodic box.
@@ -12,6 +13,9 @@ pub struct PackingFile {
     /// Sides of the box along x, y, z.
     #[serde(rename = "box")]
     pub sides: [f64; 3],
+    /// Symbol of the unit of all lengths, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "unit_symbol")]
+    pub unit: Option<LengthUnit>,
     /// Specification of each shape: `sphere`, `rock:1`, a mesh file.
     pub shapes: Vec<String>,
     /// The particles.
@@ -64,9 +68,16 @@ impl PackingFile {
         };
         Self {
             sides: period.sides().into(),
+            unit: None,
             shapes,
             particles: particles.iter().map(packed).collect(),
         }
+    }
+
+    /// The same file with lengths in this unit.
+    #[must_use]
+    pub fn with_unit(self, unit: Option<LengthUnit>) -> Self {
+        Self { unit, ..self }
     }
 
     /// The particles and their box.
@@ -127,5 +138,23 @@ impl PackingFile {
             }
         }
         Ok(file)
+    }
+}
+
+/// A unit of length as its symbol.
+mod unit_symbol {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+    use stereology_grid::LengthUnit;
+
+    #[allow(clippy::ref_option, reason = "the signature is serde's")]
+    pub(super) fn serialize<S: Serializer>(unit: &Option<LengthUnit>, serializer: S) -> Result<S::Ok, S::Error> {
+        unit.map(LengthUnit::symbol).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<LengthUnit>, D::Error> {
+        let symbol = Option::<String>::deserialize(deserializer)?;
+        symbol
+            .map(|symbol| symbol.parse().map_err(D::Error::custom))
+            .transpose()
     }
 }

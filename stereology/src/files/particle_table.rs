@@ -4,12 +4,12 @@ use crate::files::FileError;
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use std::io::Write;
 use std::path::Path;
-use stereology_grid::write_atomically;
+use stereology_grid::{LengthUnit, write_atomically};
 use stereology_shape::Particle;
 
 const COLUMNS: [&str; 10] = ["shape", "size", "category", "x", "y", "z", "qw", "qx", "qy", "qz"];
 
-/// Writes the table, completely or not at all.
+/// Writes the table, with lengths in `unit`, completely or not at all.
 ///
 /// # Errors
 ///
@@ -23,12 +23,15 @@ const COLUMNS: [&str; 10] = ["shape", "size", "category", "x", "y", "z", "qw", "
 ///
 /// let particle = Particle { shape: 0, size: 1.0, category: 0, position: nalgebra::Point3::origin(), orientation: nalgebra::UnitQuaternion::identity() };
 /// let folder = tempfile::tempdir()?;
-/// particle_table::write(folder.path().join("particles.csv"), &[particle])?;
+/// particle_table::write(folder.path().join("particles.csv"), &[particle], None)?;
 /// assert_eq!(particle_table::read(folder.path().join("particles.csv"))?, [particle]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn write(path: impl AsRef<Path>, particles: &[Particle]) -> Result<(), FileError> {
+pub fn write(path: impl AsRef<Path>, particles: &[Particle], unit: Option<LengthUnit>) -> Result<(), FileError> {
     Ok(write_atomically(path, |out| {
+        if let Some(unit) = unit {
+            writeln!(out, "# unit={unit}")?;
+        }
         writeln!(out, "{}", COLUMNS.join(","))?;
         particles.iter().try_for_each(|particle| {
             let (p, q) = (particle.position, particle.orientation.quaternion());

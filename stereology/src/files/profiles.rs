@@ -1,25 +1,33 @@
 //! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`,
-//! `slice`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored, and so
-//! are lines that begin with `#`.
+//! `slice`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored. The
+//! table may begin with lines `# key=value` ([`table_head`]).
 
 use crate::files::FileError;
+use crate::files::table_head::{self, TableHead, TableUnit};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
-use stereology_grid::write_atomically;
+use stereology_grid::{LengthUnit, write_atomically};
 use stereology_segment::Segmentation;
-use stereology_unfold::BoundingBox;
+use stereology_unfold::{BoundingBox, EdgeRule};
 
 /// Columns of the table of a segmentation.
 const HEADER: &str = "id,x,y,area,size,r,g,b,category,touches_edge,weight,left,top,right,bottom,pixels,axis_ratio,ellipticity,solidity,orientation";
 
-/// Writes the profiles of a segmentation, with lengths multiplied by `scale`, completely or not at all.
+/// Writes the profiles of a segmentation and the head of the table, with lengths multiplied by `scale`, completely or
+/// not at all.
 ///
 /// # Errors
 ///
 /// [`FileError`] if it cannot be written.
-pub fn write(path: impl AsRef<Path>, segmentation: &Segmentation, scale: f64) -> Result<(), FileError> {
+pub fn write(
+    path: impl AsRef<Path>,
+    segmentation: &Segmentation,
+    scale: f64,
+    head: &TableHead,
+) -> Result<(), FileError> {
     Ok(write_atomically(path, |out| {
+        head.write(out)?;
         writeln!(out, "{HEADER}")?;
         segmentation.profiles.iter().try_for_each(|p| {
             let [r, g, b] = p.colour.map(|c| 255.0 * c);
@@ -49,6 +57,24 @@ pub fn write(path: impl AsRef<Path>, segmentation: &Segmentation, scale: f64) ->
     })?)
 }
 
+/// The head of the table of a segmentation whose edge rule was `rule`, with lengths multiplied by `scale` to be in
+/// `unit`.
+#[must_use]
+pub fn head(segmentation: &Segmentation, scale: f64, unit: Option<LengthUnit>, rule: EdgeRule) -> TableHead {
+    let window = segmentation.window;
+    TableHead {
+        area: Some(window.area * scale * scale),
+        min_size: Some(segmentation.min_size * scale),
+        unit: TableUnit::of(scale, unit),
+        edge_rule: Some(match rule {
+            // Both are unbiased counting frames; this one decides by a point of each profile.
+            EdgeRule::AssociatedPoint => EdgeRule::CountingFrame.name().to_owned(),
+            rule => rule.name().to_owned(),
+        }),
+        window: Some([window.width, window.height].map(|side| side as f64 * scale)),
+    }
+}
+
 /// A row of a table of profiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfileRow {
@@ -64,6 +90,8 @@ pub struct ProfileRow {
     pub slice: Option<usize>,
     /// Whether the profile touches the edge of its slice, if the table has that column.
     pub touches_edge: Option<bool>,
+    /// Mean colour, encoded values / 255, if the table has the columns r, g, b.
+    pub colour: Option<[f64; 3]>,
     /// Bounding box in a window that begins at (0, 0), if the table has boxes.
     pub bounding_box: Option<BoundingBox>,
 }
@@ -73,9 +101,21 @@ pub struct ProfileRow {
 /// # Errors
 ///
 /// [`FileError`] with the line: no column of sizes or areas, an invalid value, no profiles.
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<ProfileRow>, FileError> {
+pub fn read(path: impl AsRef<Path>) -> Result<ProfileTable, FileError> {
     let path = path.as_ref();
-    parse(path).map_err(|what| FileError::value(path, what))
+    Ok(ProfileTable {
+        head: table_head::read(path)?,
+        rows: parse(path).map_err(|what| FileError::value(path, what))?,
+    })
+}
+
+/// A table of profiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProfileTable {
+    /// What its first lines state.
+    pub head: TableHead,
+    /// The profiles.
+    pub rows: Vec<ProfileRow>,
 }
 
 fn parse(path: &Path) -> Result<Vec<ProfileRow>, String> {
@@ -124,6 +164,7 @@ struct Columns {
     weight: Option<usize>,
     slice: Option<usize>,
     touches_edge: Option<usize>,
+    colour: Option<[usize; 3]>,
     sides: Option<[usize; 4]>,
 }
 
@@ -155,6 +196,10 @@ impl Columns {
             weight: column("weight"),
             slice: column("slice"),
             touches_edge: column("touches_edge"),
+            colour: match ["r", "g", "b"].map(column) {
+                [Some(r), Some(g), Some(b)] => Some([r, g, b]),
+                _ => None,
+            },
             sides: match ["left", "top", "right", "bottom"].map(column) {
                 [Some(left), Some(top), Some(right), Some(bottom)] => Some([left, top, right, bottom]),
                 _ => None,
@@ -183,6 +228,10 @@ impl Columns {
             value if value > 0.0 => Ok(value),
             value => Err(format!("{} {value} is not above zero", name(column))),
         };
+        let channel = |column: usize| match number(column)? {
+            value @ 0.0..=255.0 => Ok(value / 255.0),
+            value => Err(format!("{} {value} is not a colour value from 0 to 255", name(column))),
+        };
         let index = |column: usize, what: &str| {
             let value = text(column).parse::<u8>();
             value.map_err(|_| format!("`{}` is not a {what}: a whole number from 0 to 255", text(column)))
@@ -203,6 +252,10 @@ impl Columns {
             slice: self.slice.map(slice).transpose()?,
             category: self.category.map(|column| index(column, "category")).transpose()?,
             touches_edge: self.touches_edge.map(|column| truth(text(column))).transpose()?,
+            colour: self
+                .colour
+                .map(|[r, g, b]| Ok::<_, String>([channel(r)?, channel(g)?, channel(b)?]))
+                .transpose()?,
             bounding_box: self.sides.map(|sides| bounding_box(sides, number)).transpose()?,
             weight: match self.weight.map(number).transpose()? {
                 None => 1.0,
@@ -244,7 +297,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("profiles.csv");
         std::fs::write(&file, text).unwrap();
-        read_file(&file).map_err(|error| error.to_string())
+        read_file(&file)
+            .map(|table| table.rows)
+            .map_err(|error| error.to_string())
     }
 
     #[test]

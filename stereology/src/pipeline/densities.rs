@@ -1,16 +1,13 @@
 //! From measured profiles to particles per volume: all particles together, by particle type and by colour category.
 
-use std::ops::ControlFlow;
-
-use crate::pipeline::fitting::Fitting;
+use crate::pipeline::fitting::{Fitting, Group};
 use crate::pipeline::{
-    Association, DensityError, DensityOptions, LargestSize, MeasuredProfiles, ParticleTypes, SeparateCategories,
-    Settled, association,
+    Association, DensityError, DensityOptions, LargestSize, MeasuredProfiles, ParticleTypes, Settled, association,
 };
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
 use stereology_unfold::{
-    TypesUnfolding, UnfoldOptions, Unfolding, profile_findings, unfold_types_with_progress, unfold_with_progress,
+    CategoryDensity, CategoryModel, TypesUnfolding, Unfolding, profile_findings, unfold_types_with_progress,
 };
 
 /// Particles per volume: all together, by particle type, by colour category; and what was chosen on the way.
@@ -20,11 +17,11 @@ pub struct ParticleDensities {
     pub all: Unfolding,
     /// Each particle type, if there are several and the type of every profile is known; `all` is then their sum.
     pub by_type: Vec<Unfolding>,
-    /// Each colour category unfolded separately, if that was requested or sizes differ between categories.
-    pub categories: Option<CategoryDensities>,
-    /// Number density by category and size bin, from which a solid is populated; `None` in bins wholly below the
-    /// threshold. Category c is entry c.
-    pub by_category: Vec<Vec<Option<f64>>>,
+    /// Parts of `all` by colour category, in increasing order; they sum to it. A category with no profile above the
+    /// threshold has none. Where the types of the profiles are known, each category has a part of each type.
+    pub by_category: Vec<CategoryPart>,
+    /// Edges of the fine bins of every part, of which the reported bins consist.
+    pub fine_edges: Vec<f64>,
     /// Whether sizes differ between colour categories.
     pub association: Association,
     /// The particle types, with the fractions of the fit.
@@ -35,19 +32,21 @@ pub struct ParticleDensities {
     pub profile_edges: Vec<f64>,
     /// What was chosen or estimated before the fit.
     pub settled: Settled,
-    /// Remarks: those of `all` and of each type, then `fewer-bins` and `largest-uncorrected`.
+    /// Remarks: those of `all` and of each type, then `fewer-bins`, `largest-uncorrected` and `merged-category`.
     pub findings: Vec<Finding>,
 }
 
-/// Colour categories unfolded separately, on common bins.
+/// The particles of a colour category, of all types or of one.
 #[derive(Clone, Debug)]
-pub struct CategoryDensities {
-    /// Category of each entry of `found.types`, in increasing order.
-    pub categories: Vec<u8>,
-    /// Particle type of each entry, if the types of the profiles are known.
-    pub kinds: Vec<Option<usize>>,
-    /// Each entry separately, and their sum, with intervals if requested.
-    pub found: TypesUnfolding,
+pub struct CategoryPart {
+    /// The category.
+    pub category: u8,
+    /// The type of these particles, if the types of the profiles are known; otherwise all types in their fractions.
+    pub kind: Option<usize>,
+    /// Counted profiles.
+    pub profiles: usize,
+    /// Particles per unit volume.
+    pub density: CategoryDensity,
 }
 
 /// Unfolds profiles to particles per volume.
@@ -58,11 +57,14 @@ pub struct CategoryDensities {
 /// - If the type of every profile is known (`profiles.types`) and there are several types, each type is unfolded with
 ///   its own kernel, eq. (9), and `all` is their sum. Otherwise all profiles are unfolded with the joint kernel of
 ///   `types`, eqs. (10)-(12).
-/// - Where sizes differ between colour categories (Kruskal-Wallis, p below 0.01), each category is also unfolded
-///   separately on the same bins, section 4.2. Otherwise all categories have the same size distribution, and each has
-///   its fraction of the profiles.
+/// - Colour categories are labels of these particles: p(category | size) is estimated from the labels of the profiles
+///   ([`unfold_categories`](stereology_unfold::unfold_categories)) where sizes differ between categories
+///   (Kruskal-Wallis, p below 0.01). Otherwise each category has its fraction of the profiles at every size. Either way
+///   the categories sum to all particles. Section 4.2 unfolds each category separately instead, whose sum is too large
+///   where the category follows the size of the profile.
 ///
-/// A category with no profile above the threshold has zero density.
+/// A category with no profile above the threshold is merged into the nearest in colour, or in size if colours are not
+/// known (`merged-category`).
 ///
 /// # Errors
 ///
@@ -116,40 +118,42 @@ pub fn unfold_profiles(
     let by_colour = by_category(profiles, &counted);
     let sizes_of = |places: &Vec<usize>| places.iter().map(|&i| profiles.sizes[i]).collect::<Vec<f64>>();
     let association = association(&by_colour.iter().map(sizes_of).collect::<Vec<_>>());
-
-    let several = by_colour.iter().filter(|places| !places.is_empty()).count() > 1;
-    let separate = several && options.categories == SeparateCategories::Always;
-    // Fits with intervals take nearly all of the time.
-    let part = if separate { 0.5 } else { 1.0 };
-    let first = |done: f64| progress(part * done);
-    let (all, by_type) = if labelled {
-        let found = unfold_types(&fitting, &counted, &first)?;
-        (found.summed(), found.types)
+    let observed: Vec<Group> = (0..=u8::MAX)
+        .zip(&by_colour)
+        .filter(|(_, places)| fitting.observed(places))
+        .map(|(category, places)| Group {
+            category,
+            places: places.clone(),
+        })
+        .collect();
+    let model = if association.together {
+        CategoryModel::BySize
     } else {
-        (unfold_together(&fitting, &counted, &first)?, Vec::new())
+        CategoryModel::Constant
     };
-    let categories = if separate {
-        let groups = category_groups(&fitting, &by_colour, labelled);
-        unfold_categories(&fitting, groups, &fitting.unfold, &|done| progress(part + part * done))?
-    } else if association.together {
-        let groups = category_groups(&fitting, &by_colour, false);
-        let without_intervals = UnfoldOptions {
-            bootstrap: None,
-            ..fitting.unfold
-        };
-        unfold_categories(&fitting, groups, &without_intervals, &|_| ControlFlow::Continue(()))?
+    let (mut all, by_type, by_category, fine_edges) = if labelled {
+        // Fits with intervals take nearly all of the time.
+        let found = unfold_types(&fitting, &counted, &|done| progress(0.5 * done))?;
+        let (parts, edges) = split_types(&fitting, &counted, &observed, model, &|done| progress(0.5 + 0.5 * done))?;
+        (found.summed(), found.types, parts, edges)
     } else {
-        None
+        let found = fitting.categories(&counted, &observed, None, model, progress)?;
+        let parts = parts(&observed, None, &found.categories, |group| group.places.len());
+        (found.all, Vec::new(), parts, found.fine_edges)
     };
-    let by_category = match &categories {
-        Some(separate) if association.together => summed_by_category(separate, &all, by_colour.len()),
-        _ => fractions_by_category(profiles, &all, &by_colour),
-    };
+    if !labelled {
+        all.findings = fitting.cured(&all.findings, &counted, None);
+        if let Some(edges) = fitting.histogram_edges() {
+            all.rebin_profiles(&edges);
+        }
+    }
+    let mut findings = findings(profiles, &all, &by_type, counted.len(), &fitting.settled, options);
+    findings.extend(merged_categories(profiles, &by_colour, &observed, all.threshold));
     Ok(ParticleDensities {
-        findings: findings(profiles, &all, &by_type, counted.len(), &fitting.settled, options),
+        findings,
         by_type,
-        categories,
         by_category,
+        fine_edges,
         association,
         types: fitting.types.into_owned(),
         sizes: options.sizes,
@@ -157,15 +161,6 @@ pub fn unfold_profiles(
         settled: fitting.settled,
         all,
     })
-}
-
-impl ParticleDensities {
-    /// Number density of a size bin, summed over the categories; `None` below the threshold.
-    #[must_use]
-    pub fn combined(&self, bin: usize) -> Option<f64> {
-        let known: Vec<f64> = self.by_category.iter().filter_map(|category| category[bin]).collect();
-        (!known.is_empty()).then(|| known.iter().sum())
-    }
 }
 
 /// Checks the types of the profiles, if they are known.
@@ -195,21 +190,6 @@ fn by_category(profiles: &MeasuredProfiles, counted: &[usize]) -> Vec<Vec<usize>
     groups
 }
 
-/// All profiles with the joint kernel of the types.
-fn unfold_together(
-    fitting: &Fitting<'_>,
-    counted: &[usize],
-    progress: Progress<'_>,
-) -> Result<Unfolding, DensityError> {
-    let (counts, kernel) = fitting.part(counted, None)?;
-    let mut all = unfold_with_progress(&counts, &kernel, &fitting.unfold, progress)?;
-    all.findings = fitting.cured(&all.findings, counted, None);
-    if let Some(edges) = fitting.histogram_edges() {
-        all.rebin_profiles(&edges);
-    }
-    Ok(all)
-}
-
 /// Each type with its own kernel.
 fn unfold_types(
     fitting: &Fitting<'_>,
@@ -217,78 +197,21 @@ fn unfold_types(
     progress: Progress<'_>,
 ) -> Result<TypesUnfolding, DensityError> {
     let types = fitting.types.types();
-    let of_type = |kind: usize| Group {
-        places: fitting.of_type(counted, kind),
-        kind: Some(kind),
-    };
-    let groups: Vec<Group> = (0..types.len()).map(of_type).collect();
-    if let Some(index) = groups.iter().position(|group| group.places.is_empty()) {
+    let places: Vec<Vec<usize>> = (0..types.len()).map(|kind| fitting.of_type(counted, kind)).collect();
+    if let Some(index) = places.iter().position(Vec::is_empty) {
         return Err(DensityError::EmptyType {
             index,
             name: types[index].name.clone(),
         });
     }
-    unfold_groups(fitting, &groups, &fitting.unfold, progress)
-}
-
-/// Profiles that are unfolded separately.
-struct Group {
-    places: Vec<usize>,
-    /// The type of their particles; `None`: all types in their fractions.
-    kind: Option<usize>,
-}
-
-/// The categories, and within each the types if `labelled`, that have a profile above the threshold.
-fn category_groups(fitting: &Fitting<'_>, by_colour: &[Vec<usize>], labelled: bool) -> Vec<(u8, Group)> {
-    let kinds: Vec<Option<usize>> = if labelled {
-        (0..fitting.types.types().len()).map(Some).collect()
-    } else {
-        vec![None]
-    };
-    let mut groups = Vec::new();
-    for (category, places) in (0..=u8::MAX).zip(by_colour) {
-        for &kind in &kinds {
-            let places = kind.map_or_else(|| places.clone(), |kind| fitting.of_type(places, kind));
-            if fitting.observed(&places) {
-                groups.push((category, Group { places, kind }));
-            }
-        }
-    }
-    groups
-}
-
-/// Unfolds the categories; `None` if none has a profile above the threshold.
-fn unfold_categories(
-    fitting: &Fitting<'_>,
-    groups: Vec<(u8, Group)>,
-    options: &UnfoldOptions,
-    progress: Progress<'_>,
-) -> Result<Option<CategoryDensities>, DensityError> {
-    let (categories, groups): (Vec<u8>, Vec<Group>) = groups.into_iter().unzip();
-    if categories.is_empty() {
-        return Ok(None);
-    }
-    let found = unfold_groups(fitting, &groups, options, progress)?;
-    Ok(Some(CategoryDensities {
-        categories,
-        kinds: groups.iter().map(|group| group.kind).collect(),
-        found,
-    }))
-}
-
-fn unfold_groups(
-    fitting: &Fitting<'_>,
-    groups: &[Group],
-    options: &UnfoldOptions,
-    progress: Progress<'_>,
-) -> Result<TypesUnfolding, DensityError> {
-    let parts = groups
+    let fits = places
         .iter()
-        .map(|group| fitting.part(&group.places, group.kind))
+        .enumerate()
+        .map(|(kind, places)| fitting.part(places, Some(kind)))
         .collect::<Result<Vec<_>, DensityError>>()?;
-    let mut found = unfold_types_with_progress(&parts, options, progress)?;
-    for (part, group) in found.types.iter_mut().zip(groups) {
-        part.findings = fitting.cured(&part.findings, &group.places, group.kind);
+    let mut found = unfold_types_with_progress(&fits, &fitting.unfold, progress)?;
+    for (kind, (part, places)) in found.types.iter_mut().zip(&places).enumerate() {
+        part.findings = fitting.cured(&part.findings, places, Some(kind));
     }
     if let Some(edges) = fitting.histogram_edges() {
         found.rebin_profiles(&edges);
@@ -296,35 +219,74 @@ fn unfold_groups(
     Ok(found)
 }
 
-/// Separate densities of every category, zero for those with no profile above the threshold.
-fn summed_by_category(separate: &CategoryDensities, all: &Unfolding, categories: usize) -> Vec<Vec<Option<f64>>> {
-    let none: Vec<Option<f64>> = all.number_density.iter().map(|density| density.map(|_| 0.0)).collect();
-    let mut sums = vec![none; categories];
-    for (&category, part) in separate.categories.iter().zip(&separate.found.types) {
-        for (sum, density) in sums[usize::from(category)].iter_mut().zip(&part.number_density) {
-            *sum = match (*sum, *density) {
-                (Some(sum), Some(density)) => Some(sum + density),
-                (sum, density) => sum.or(density),
-            };
-        }
+/// The categories of each type, and the edges of their fine bins.
+fn split_types(
+    fitting: &Fitting<'_>,
+    counted: &[usize],
+    observed: &[Group],
+    model: CategoryModel,
+    progress: Progress<'_>,
+) -> Result<(Vec<CategoryPart>, Vec<f64>), DensityError> {
+    let kinds = fitting.types.types().len();
+    let (mut found, mut edges) = (Vec::new(), Vec::new());
+    for kind in 0..kinds {
+        let part = |done: f64| progress((kind as f64 + done) / kinds as f64);
+        let of_type = fitting.categories(&fitting.of_type(counted, kind), observed, Some(kind), model, &part)?;
+        let profiles = |group: &Group| fitting.of_type(&group.places, kind).len();
+        found.extend(parts(observed, Some(kind), &of_type.categories, profiles));
+        edges = of_type.fine_edges;
     }
-    sums
+    found.sort_by_key(|part| (part.category, part.kind));
+    Ok((found, edges))
 }
 
-/// The density of all, in proportion to the profiles of every category.
-fn fractions_by_category(
+fn parts(
+    observed: &[Group],
+    kind: Option<usize>,
+    densities: &[CategoryDensity],
+    profiles: impl Fn(&Group) -> usize,
+) -> Vec<CategoryPart> {
+    let groups = observed.iter().zip(densities);
+    groups
+        .map(|(group, density)| CategoryPart {
+            category: group.category,
+            kind,
+            profiles: profiles(group),
+            density: density.clone(),
+        })
+        .collect()
+}
+
+/// A remark for each category whose profiles are all below the threshold.
+fn merged_categories(
     profiles: &MeasuredProfiles,
-    all: &Unfolding,
     by_colour: &[Vec<usize>],
-) -> Vec<Vec<Option<f64>>> {
-    let weight_of = |places: &[usize]| places.iter().map(|&i| profiles.weights[i]).sum::<f64>();
-    let whole: f64 = profiles.weights.iter().filter(|weight| **weight > 0.0).sum();
-    let of_category = |places: &Vec<usize>| {
-        let fraction = weight_of(places) / whole;
-        let densities = all.number_density.iter();
-        densities.map(|density| density.map(|n| n * fraction)).collect()
-    };
-    by_colour.iter().map(of_category).collect()
+    observed: &[Group],
+    threshold: f64,
+) -> Vec<Finding> {
+    let mean_size =
+        |places: &[usize]| places.iter().map(|&i| profiles.sizes[i]).sum::<f64>() / places.len().max(1) as f64;
+    let is_observed = |category: usize| observed.iter().any(|group| usize::from(group.category) == category);
+    let merged = (0..by_colour.len()).filter(|&category| !by_colour[category].is_empty() && !is_observed(category));
+    merged
+        .filter_map(|category| {
+            let colour = |category: usize| profiles.colours.get(category);
+            let distance = |group: &&Group| match (colour(category), colour(usize::from(group.category))) {
+                (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>(),
+                _ => (mean_size(&by_colour[category]) - mean_size(&group.places)).abs(),
+            };
+            let nearest = observed.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            let by = if colour(category).is_some() { "colour" } else { "size" };
+            Some(Finding::new(
+                "merged-category",
+                format!(
+                    "none of the {} profiles of category {category} is above the threshold {threshold:.4}: its particles are counted in category {}, the nearest in {by}",
+                    by_colour[category].len(),
+                    nearest.category
+                ),
+            ))
+        })
+        .collect()
 }
 
 fn findings(

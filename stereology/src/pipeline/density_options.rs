@@ -21,8 +21,6 @@ pub struct DensityOptions {
     pub sizes: Sizes,
     /// Fractions of the particle types, where the types of the profiles are not known.
     pub fractions: TypeFractions,
-    /// Which colour categories are unfolded separately.
-    pub categories: SeparateCategories,
     /// The estimator, its threshold and intervals. Without a threshold the detection limit of the profiles is used.
     pub unfold: UnfoldOptions,
 }
@@ -39,7 +37,6 @@ impl Default for DensityOptions {
             capping: Capping::None,
             sizes: Sizes::Integrated,
             fractions: TypeFractions::Given,
-            categories: SeparateCategories::WhereSizesDiffer,
             unfold: UnfoldOptions::default(),
         }
     }
@@ -91,14 +88,4 @@ pub enum TypeFractions {
     Given,
     /// The fractions of highest likelihood; an error where the profiles do not determine them.
     Likelihood,
-}
-
-/// Which colour categories are unfolded separately.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SeparateCategories {
-    /// All, without intervals, if sizes differ between them; otherwise none.
-    #[default]
-    WhereSizesDiffer,
-    /// All, with the intervals of the options.
-    Always,
 }

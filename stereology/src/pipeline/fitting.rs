@@ -9,11 +9,17 @@ use crate::pipeline::{
     UnfoldingBins, capping_angle, largest_particle, size_edges, type_fractions,
 };
 use stereology_kmatrix::Sizes;
-use stereology_metrics::Finding;
+use stereology_metrics::{Finding, Progress};
 use stereology_unfold::{
-    Fractions, Kernel, LikelyParameter, Method, ProfileCounts, UnfoldOptions, divided_edges, equal_edges, unfold,
-    with_cure,
+    CategoryModel, CategoryUnfolding, Fractions, Kernel, LikelyParameter, Method, ProfileCounts, UnfoldOptions,
+    divided_edges, equal_edges, unfold, unfold_categories, with_cure,
 };
+
+/// Counted profiles of a category.
+pub(crate) struct Group {
+    pub(crate) category: u8,
+    pub(crate) places: Vec<usize>,
+}
 
 /// Fits of one table of profiles.
 pub(crate) struct Fitting<'a> {
@@ -98,6 +104,37 @@ impl<'a> Fitting<'a> {
             self.counts(places, &self.bins)?,
             self.kernel(of, &self.bins, &self.edges)?,
         ))
+    }
+
+    /// [`part`](Self::part) unfolded, with the densities split by the categories of `groups`.
+    pub(crate) fn categories(
+        &self,
+        places: &[usize],
+        groups: &[Group],
+        of: Option<usize>,
+        model: CategoryModel,
+        progress: Progress<'_>,
+    ) -> Result<CategoryUnfolding, DensityError> {
+        let (counts, kernel) = self.part(places, of)?;
+        let labelled = groups
+            .iter()
+            .map(|group| {
+                let places = of.map_or_else(|| group.places.clone(), |kind| self.of_type(&group.places, kind));
+                if places.is_empty() {
+                    let none = vec![0.0; counts.counts().len()];
+                    return Ok(ProfileCounts::from_counts(&none, counts.edges(), self.profiles.area)?);
+                }
+                self.counts(&places, &self.bins)
+            })
+            .collect::<Result<Vec<_>, DensityError>>()?;
+        Ok(unfold_categories(
+            &counts,
+            &labelled,
+            model,
+            &kernel,
+            &self.unfold,
+            progress,
+        )?)
     }
 
     /// Those of the profiles at `places` that are of a type.

@@ -12,6 +12,8 @@ pub struct MeasuredProfiles {
     pub weights: Vec<f64>,
     /// Colour categories, from 0.
     pub categories: Vec<u8>,
+    /// Mean colour of each category, encoded values / 255; empty if it is not known.
+    pub colours: Vec<[f64; 3]>,
     /// Index of the slice of each profile, from 0; empty for one slice, or if the slices are not known.
     pub slices: Vec<usize>,
     /// Index of the particle type of each profile, from 0; empty if the types are not known.
@@ -23,6 +25,17 @@ pub struct MeasuredProfiles {
 }
 
 impl MeasuredProfiles {
+    /// Detection limit where profiles from the size `smallest` on are kept: just below it.
+    ///
+    /// ```
+    /// use stereology::pipeline::MeasuredProfiles;
+    /// assert!(MeasuredProfiles::limit_below(2.0) < 2.0);
+    /// ```
+    #[must_use]
+    pub fn limit_below(smallest: f64) -> f64 {
+        smallest * (1.0 - 1e-9)
+    }
+
     /// Indices of the profiles with a positive weight.
     pub(crate) fn counted(&self) -> Result<Vec<usize>, DensityError> {
         let counted: Vec<usize> = (0..self.sizes.len()).filter(|&i| self.weights[i] > 0.0).collect();

@@ -7,8 +7,10 @@ mod association;
 mod colouring;
 mod densities;
 mod density_options;
+mod digest;
 mod fine_details;
 mod finish_grown;
+mod finished;
 mod fitting;
 mod measured_profiles;
 mod narrowing;
@@ -28,11 +30,13 @@ mod verdict;
 mod verification;
 
 pub use association::{Association, SIGNIFICANT, association};
-pub use colouring::particle_colours;
-pub use densities::{CategoryDensities, ParticleDensities, unfold_profiles};
-pub use density_options::{Capping, DensityOptions, LargestSize, SeparateCategories, Spacing, TypeFractions};
+pub use colouring::{ColourSample, particle_colours};
+pub use densities::{CategoryPart, ParticleDensities, unfold_profiles};
+pub use density_options::{Capping, DensityOptions, LargestSize, Spacing, TypeFractions};
+pub use digest::{Digest, Inputs};
 pub use fine_details::{FineDetails, fine_details};
 pub use finish_grown::finish_grown;
+pub use finished::{Finished, FinishedPacking, FinishedTexture};
 pub use fitting::Settled;
 pub use measured_profiles::{DensityError, MeasuredProfiles};
 pub use outline_comparison::{OutlineComparison, OutlineDistance};
@@ -45,7 +49,9 @@ pub use shape_table::{SHAPES, ShapeDensity, ShapeEstimates, densities_by_shape};
 pub use size_classes::size_edges;
 pub use solid_comparison::{CompareOptions, compare_solid};
 pub use stereology_metrics::{Finding, Level, Progress};
-pub use synthesis::{Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize};
+pub use synthesis::{
+    Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize, synthesize_from,
+};
 pub use texture_limits::{TextureLimits, image_texture_limits, texture_limits};
 pub use unfolding_bins::UnfoldingBins;
 pub use verdict::{Check, CheckName, Evidence, Opinion, Verdict};

@@ -105,13 +105,7 @@ pub fn population(
 ) -> Result<Population, PopulationFailure> {
     let bodies = types.unit_bodies();
     let bins = observable_bins(densities);
-    let unit_volume: f64 = types
-        .types()
-        .iter()
-        .zip(&bodies)
-        .map(|(of, body)| of.share * body.volume())
-        .sum();
-    let unfolded_fraction = unit_volume * bins.iter().map(Bin::volume).sum::<f64>();
+    let unfolded_fraction = densities.all.volume_fraction.value;
     let number: f64 = bins.iter().map(|bin| bin.number_density).sum();
     if !(unfolded_fraction > 0.0 && number > 0.0) {
         return Err(PopulationFailure::Nothing);
@@ -155,7 +149,7 @@ pub fn population(
     })
 }
 
-/// Part of a size bin above the threshold, all categories together.
+/// Part of a fine size bin above the threshold, all categories together.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
     index: usize,
@@ -173,12 +167,12 @@ impl Bin {
     }
 }
 
-/// The bins above the threshold; of the bin that contains it, the part above.
+/// The fine bins above the threshold; of the bin that contains it, the part above.
 fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
-    let all = &densities.all;
+    let edges = &densities.fine_edges;
     let bin = |index: usize| {
-        let (lower, upper) = (all.edges[index], all.edges[index + 1]);
-        let number_density = densities.combined(index)?;
+        let (lower, upper) = (edges[index], edges[index + 1]);
+        let number_density = densities.by_category.iter().map(|part| part.density.fine[index]).sum();
         if densities.sizes == Sizes::UpperEdge {
             return Some(Bin {
                 index,
@@ -187,7 +181,7 @@ fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
                 number_density,
             });
         }
-        let seen = lower.max(all.threshold.min(upper));
+        let seen = lower.max(densities.all.threshold.min(upper));
         // The density of that bin counts only the particles above the threshold.
         (seen < upper).then_some(Bin {
             index,
@@ -196,7 +190,7 @@ fn observable_bins(densities: &ParticleDensities) -> Vec<Bin> {
             number_density,
         })
     };
-    (0..all.number_density.len()).filter_map(bin).collect()
+    (0..edges.len() - 1).filter_map(bin).collect()
 }
 
 fn side(
@@ -299,27 +293,35 @@ fn draw(
             if spread {
                 bin.lower
             } else {
-                densities.all.edges[bin.index]
+                densities.fine_edges[bin.index]
             }
         })
         .collect();
     edges.push(last.upper);
     let mut histograms = Vec::new();
-    for (shape, of) in types.types().iter().enumerate() {
-        for (category, by_bin) in densities.by_category.iter().enumerate() {
-            let number = bins
-                .iter()
-                .map(|bin| {
-                    let whole = densities.combined(bin.index).unwrap_or(0.0);
-                    let share = if whole > 0.0 {
-                        by_bin[bin.index].unwrap_or(0.0) / whole
-                    } else {
-                        0.0
-                    };
-                    bin.number_density * share * of.share * density_factor
-                })
-                .collect::<Vec<f64>>();
-            histograms.push((shape, u8::try_from(category).unwrap_or(u8::MAX), number));
+    for part in &densities.by_category {
+        let number = |share: f64| -> Vec<f64> {
+            let of_bin = |bin: &Bin| {
+                let whole: f64 = densities
+                    .by_category
+                    .iter()
+                    .map(|part| part.density.fine[bin.index])
+                    .sum();
+                let fraction = if whole > 0.0 {
+                    part.density.fine[bin.index] / whole
+                } else {
+                    0.0
+                };
+                bin.number_density * fraction * share * density_factor
+            };
+            bins.iter().map(of_bin).collect()
+        };
+        match part.kind {
+            Some(shape) => histograms.push((shape, part.category, number(1.0))),
+            None => {
+                let shapes = types.types().iter().enumerate();
+                histograms.extend(shapes.map(|(shape, of)| (shape, part.category, number(of.share))));
+            }
         }
     }
     let histograms: Vec<SizeDensities<'_>> = histograms

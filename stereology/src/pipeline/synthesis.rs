@@ -1,6 +1,8 @@
 //! The whole chain: from a photograph to a solid, with a verdict on whether to trust it.
 
-use crate::pipeline::colouring::particle_colours;
+use crate::pipeline::colouring::{ColourSample, particle_colours};
+use crate::pipeline::digest::Digest;
+use crate::pipeline::finished::{Finished, packing_inputs, texture_inputs};
 use crate::pipeline::narrowing::single;
 use crate::pipeline::{
     DensityError, DensityOptions, Evidence, Extent, FineDetails, MeasuredProfiles, ParticleDensities, ParticleTypes,
@@ -117,6 +119,12 @@ pub struct Synthesis {
     pub verdict: Verdict,
     /// Remarks of all steps, in their order.
     pub findings: Vec<Finding>,
+    /// Digest of what the packing was made of.
+    pub packing_inputs: Digest,
+    /// Digest of what the residual volumes were made of.
+    pub texture_inputs: Digest,
+    /// Steps of an earlier run that were taken up.
+    pub taken_up: Vec<Step>,
 }
 
 /// Why a solid could not be made.
@@ -206,6 +214,23 @@ pub fn synthesize(
     options: &SynthesisOptions,
     progress: &(dyn Fn(Step, f64) -> ControlFlow<()> + Sync),
 ) -> Result<Synthesis, SynthesisError> {
+    synthesize_from(photo, labels, types, options, &Finished::default(), progress)
+}
+
+/// [`synthesize`], which takes up the packing and the residual volume of an earlier run if they were made of the same
+/// inputs with the same options. The result is the same, bit for bit.
+///
+/// # Errors
+///
+/// As [`synthesize`].
+pub fn synthesize_from(
+    photo: &RgbImage,
+    labels: Option<Array2<u32>>,
+    types: &ParticleTypes,
+    options: &SynthesisOptions,
+    finished: &Finished,
+    progress: &(dyn Fn(Step, f64) -> ControlFlow<()> + Sync),
+) -> Result<Synthesis, SynthesisError> {
     if !(options.pixel.is_finite() && options.pixel > 0.0) {
         return Err(SynthesisError::Pixel(options.pixel));
     }
@@ -238,18 +263,41 @@ pub fn synthesize(
         populate(&population.grains, &population.period, options.seed),
         population.period,
     )?;
-    let packing = pack(&start, &options.pack, &|done| progress(Step::Pack, done))?;
-    let details = fine_details(
-        &segmentation,
-        &segmentation.residual(),
-        options.texture_voxels,
-        options.pixel,
-        &options.texture,
-        &|done| progress(Step::Texture, done),
-    )?;
+    let mut taken_up = Vec::new();
+    let packing_inputs = packing_inputs(&start, types, &options.pack);
+    let packing = match finished
+        .packing
+        .as_ref()
+        .and_then(|of| of.packing(&packing_inputs, &start))
+    {
+        Some(packing) => {
+            taken_up.push(Step::Pack);
+            packing
+        }
+        None => pack(&start, &options.pack, &|done| progress(Step::Pack, done))?,
+    };
+    let texture_inputs = texture_inputs(&segmentation, options.pixel, options.texture_voxels, &options.texture);
+    let details = match finished.texture.as_ref().filter(|of| of.inputs == texture_inputs) {
+        Some(of) => {
+            taken_up.push(Step::Texture);
+            of.details.clone()
+        }
+        None => fine_details(
+            &segmentation,
+            &segmentation.residual(),
+            options.texture_voxels,
+            options.pixel,
+            &options.texture,
+            &|done| progress(Step::Texture, done),
+        )?,
+    };
     let solid = Solid::new(
         packing.arrangement().clone(),
-        particle_colours(&packing, &segmentation.profiles, options.pixel, options.seed),
+        particle_colours(
+            packing.particles(),
+            &colour_samples(&segmentation, options.pixel),
+            options.seed,
+        ),
         segmentation.binder.colour.map(single),
         Some(details.residual.clone()),
     )?
@@ -294,7 +342,15 @@ pub fn synthesize(
         spectra,
         verdict,
         findings,
+        packing_inputs,
+        texture_inputs,
+        taken_up,
     })
+}
+
+fn colour_samples(segmentation: &Segmentation, pixel: f64) -> Vec<ColourSample> {
+    let profiles = segmentation.profiles.iter();
+    profiles.map(|profile| ColourSample::of(profile, pixel)).collect()
 }
 
 fn mean_size(packing: &Packing) -> f64 {
@@ -327,10 +383,10 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         sizes: profiles.iter().map(|profile| profile.size * pixel).collect(),
         weights: profiles.iter().map(|profile| profile.weight).collect(),
         categories: profiles.iter().map(|profile| profile.category).collect(),
+        colours: segmentation.categories.iter().map(|category| category.colour).collect(),
         slices: Vec::new(),
         types: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
-        // Profiles of exactly the smallest area are kept, so the threshold lies just below it.
-        min_size: segmentation.min_size * pixel * (1.0 - 1e-9),
+        min_size: MeasuredProfiles::limit_below(segmentation.min_size * pixel),
     }
 }

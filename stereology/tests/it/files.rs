@@ -8,8 +8,9 @@ use stereology::files::densities::DensityRows;
 use stereology::files::packing::PackingFile;
 use stereology::files::voxel_table::{ValueRange, ValueRow};
 use stereology::files::{densities, particle_table, profiles, solid as solid_files, voxel_table, vtp, xyz};
+use stereology::grid::LengthUnit;
 use stereology::pipeline::ParticleTypes;
-use stereology::segment::{SegmentOptions, Segmentation};
+use stereology::segment::{EdgeRule, SegmentOptions, Segmentation};
 use stereology::shape::{Arrangement, Particle, PeriodicBox};
 use stereology::volume::{Residual, Solid};
 
@@ -53,7 +54,7 @@ proptest! {
         let bodies = ParticleTypes::parse(&["ellipsoid:1,1,0.5", "rock:1"]).unwrap().unit_bodies();
         let period = PeriodicBox::new(Vector3::new(8.0, 9.0, 10.0)).unwrap();
         let arrangement = Arrangement::new(bodies, particles.clone(), period).unwrap();
-        particle_table::write(at("p.csv"), &particles).unwrap();
+        particle_table::write(at("p.csv"), &particles, Some(LengthUnit::Micrometre)).unwrap();
         prop_assert_eq!(&particle_table::read(at("p.csv")).unwrap(), &particles);
         vtp::write(at("p.vtp"), &particles).unwrap();
         prop_assert_eq!(&vtp::read(at("p.vtp")).unwrap(), &particles);
@@ -68,10 +69,10 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("densities.csv");
         let edges: Vec<f64> = (0..5).map(|k| width * f64::from(k)).collect();
-        let mut rows = DensityRows::default();
-        rows.densities(&edges, &[Some(1.0); 4], None, None);
-        for (category, part) in density.chunks(4).enumerate() {
-            rows.densities(&edges, part, Some(0), Some(category));
+        let mut rows = DensityRows::new(Some(LengthUnit::Millimetre));
+        rows.bins(&edges, &[Some(1.0); 4], None, None, None);
+        for (category, part) in (0_u8..).zip(density.chunks(4)) {
+            rows.bins(&edges, part, None, Some(0), Some(category));
         }
         rows.write(&path).unwrap();
         match densities::read(&path) {
@@ -124,8 +125,11 @@ proptest! {
         prop_assume!(!found.profiles.is_empty());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("profiles.csv");
-        profiles::write(&path, &found, scale).unwrap();
-        let read = profiles::read(&path).unwrap();
+        let head = profiles::head(&found, scale, Some(LengthUnit::Inch), EdgeRule::All);
+        profiles::write(&path, &found, scale, &head).unwrap();
+        let table = profiles::read(&path).unwrap();
+        prop_assert_eq!(&table.head, &head);
+        let read = table.rows;
         prop_assert_eq!(read.len(), found.profiles.len());
         for (row, profile) in read.iter().zip(&found.profiles) {
             prop_assert_eq!((row.size, row.weight), (profile.size * scale, profile.weight));
@@ -144,7 +148,7 @@ proptest! {
         let field = Array4::from_shape_vec((4, 4, 4, 3), texture).unwrap();
         let residual = Residual { particles: -&field, binder: field, voxel: 2.0 };
         let solid = Solid::new(Arrangement::new(types.unit_bodies(), particles, period).unwrap(), colours, [0.8, 0.7, 0.6], Some(residual.clone())).unwrap();
-        solid_files::write(folder.path(), &solid, &residual, &types).unwrap();
+        solid_files::write(folder.path(), &solid, Some(&residual), &types, Some(LengthUnit::Nanometre)).unwrap();
         let read = solid_files::read(folder.path()).unwrap().solid;
         for i in 0..200 {
             let p = Point3::new(0.37 * f64::from(i), 0.61 * f64::from(i), 0.17 * f64::from(i));
@@ -193,7 +197,14 @@ fn damaged_solids_are_refused() {
         Some(residual.clone()),
     )
     .unwrap();
-    solid_files::write(folder.path(), &solid, &residual, &types).unwrap();
+    solid_files::write(
+        folder.path(),
+        &solid,
+        Some(&residual),
+        &types,
+        Some(LengthUnit::Nanometre),
+    )
+    .unwrap();
     solid_files::read(folder.path()).unwrap();
 
     let edits: [(&str, &str, &str, &str); 9] = [

@@ -14,12 +14,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stereology::anneal::{Grain, PackOptions, Packing, lognormal_sizes, pack, populate, scale_to_fraction};
 use stereology::pipeline::{
-    DensityOptions, Extent, MeasuredProfiles, ParticleDensities, ParticleTypes, fine_details, measured_profiles,
-    particle_colours, population, unfold_profiles,
+    ColourSample, DensityOptions, Extent, MeasuredProfiles, ParticleDensities, ParticleTypes, fine_details,
+    measured_profiles, particle_colours, population, unfold_profiles,
 };
 use stereology::pyramid::{Exemplar, Mode, TextureOptions, synthesize_volume};
 use stereology::render::{Camera, RenderOptions, render_mesh};
-use stereology::segment::{Profile, SegmentOptions, Segmentation, segment};
+use stereology::segment::{SegmentOptions, Segmentation, segment};
 use stereology::shape::{Arrangement, PeriodicBox};
 use stereology::unfold::{Bootstrap, UnfoldOptions};
 use stereology::volume::{Axis, Residual, SlicePlane, Solid};
@@ -131,10 +131,10 @@ fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensi
     let voxels = 128;
     let drawn = population(densities, types, fraction, Extent::Count(6000), f64::from(voxels), SEED)?;
     let packing = packed(types, &drawn.grains, &drawn.period)?;
-    let profiles: Vec<Profile> = found
+    let profiles: Vec<ColourSample> = found
         .iter()
-        .flat_map(|of| of.profiles.iter().cloned())
-        .map(|profile| Profile { category: 0, ..profile })
+        .flat_map(|of| of.profiles.iter().map(|profile| ColourSample::of(profile, 1.0)))
+        .map(|sample| ColourSample { category: 0, ..sample })
         .collect();
     let first = &found[0];
     let details = fine_details(
@@ -147,7 +147,7 @@ fn copy(types: &ParticleTypes, found: &[Segmentation], densities: &ParticleDensi
     )?;
     Ok(Solid::new(
         packing.arrangement().clone(),
-        particle_colours(&packing, &profiles, 1.0, SEED),
+        particle_colours(packing.particles(), &profiles, SEED),
         first.binder.colour.map(|c| c as f32),
         Some(details.residual),
     )?)

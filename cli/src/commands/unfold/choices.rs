@@ -4,9 +4,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use stereology::kmatrix::Sizes;
-use stereology::pipeline::{
-    self, Capping, DensityOptions, LargestSize, ParticleTypes, SeparateCategories, TypeFractions,
-};
+use stereology::pipeline::{self, Capping, DensityOptions, LargestSize, ParticleTypes, TypeFractions};
 use stereology::unfold::{self, Bootstrap, Resampling, UnfoldOptions};
 
 use crate::failure::{Explain, Failure, body};
@@ -27,7 +25,8 @@ pub struct Defaults {
 #[group(id = "unfold-choices")]
 pub struct Choices {
     /// Number of size bins between 0 and the largest size; auto: as many as have five profiles each, at most 2 n^(1/3)
-    /// for n profiles [default: 10; 16 for synthesize, because sections of the solid show the steps of coarser bins]
+    /// for n profiles [default: 10; 16 for synthesize and for tables of segment, because sections of the solid show the
+    /// steps of coarser bins]
     #[arg(long, value_name = "N|auto", conflicts_with = "edges")]
     pub bins: Option<BinCount>,
     /// Edges of the size bins, instead of --bins
@@ -173,7 +172,6 @@ impl Choices {
             capping: self.capping(),
             sizes: self.sizes(),
             fractions: TypeFractions::Given,
-            categories: SeparateCategories::WhereSizesDiffer,
             unfold: UnfoldOptions {
                 method: self.method.estimator(),
                 min_size: self.min_size.map(|size| size * scale),

@@ -35,9 +35,14 @@ impl EdgeRule {
         }
     }
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        self.rule().name()
+    }
+
     /// Replaces the weights of the table by those of the rule, for slices with this width and height.
     pub fn weigh(self, profiles: &mut [ProfileRow], window: Option<[f64; 2]>) -> Result<(), Failure> {
-        let name = self.rule().name();
+        let name = self.name();
         let boxes: Option<Vec<BoundingBox>> = profiles.iter().map(|profile| profile.bounding_box).collect();
         let weights = match (boxes, window, self) {
             (Some(boxes), Some([width, height]), _) => {

@@ -2,10 +2,8 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::pipeline::CategoryDensities;
-use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, TypesUnfolding, Unfolding};
-
-use crate::warnings::Record;
+use stereology::pipeline::ParticleDensities;
+use stereology::unfold::{CrossCheck, Estimate, Interval, Percentiles, SHARES, Unfolding};
 
 /// Number densities and what follows from them: most of the JSON of `stereology unfold`, and `unfold` in that of
 /// `stereology synthesize`.
@@ -144,9 +142,16 @@ struct CheckFields {
     expected: f64,
 }
 
-/// Densities of a colour category, or of all categories together.
+/// Densities of a colour category, or of one particle type in it.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct GroupFields {
+pub struct CategoryFields {
+    /// Number of the category.
+    category: u8,
+    /// Particle type; null if types are not distinguished.
+    #[serde(rename = "type")]
+    kind: Option<usize>,
+    /// Number of profiles.
+    profiles: usize,
     /// Particles per unit volume in each bin; null where a bin lies wholly below the detection limit.
     number_density: Vec<Option<f64>>,
     /// Lower ends of the confidence intervals; null without a bootstrap.
@@ -155,24 +160,6 @@ pub struct GroupFields {
     upper: Option<Vec<Option<f64>>>,
     #[serde(flatten)]
     scalars: Scalars,
-}
-
-/// Densities of a colour category, or of one particle type in it.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct CategoryFields {
-    #[serde(flatten)]
-    group: GroupFields,
-    /// Number of the category.
-    category: u8,
-    /// Particle type; null if types are not distinguished.
-    #[serde(rename = "type")]
-    kind: Option<usize>,
-    /// Number of profiles.
-    profiles: usize,
-    /// Method of estimation.
-    method: &'static str,
-    /// What deserves attention.
-    findings: Vec<Record>,
 }
 
 impl UnfoldingFields {
@@ -240,50 +227,25 @@ impl Scalars {
     }
 }
 
-impl GroupFields {
-    /// One category.
-    fn of(found: &Unfolding) -> Self {
-        let intervals = found.intervals.as_deref();
-        Self {
-            number_density: found.number_density.clone(),
-            lower: ends(intervals, |interval| interval.lower),
-            upper: ends(intervals, |interval| interval.upper),
-            scalars: Scalars::of(found.total, found.mean_size, found.volume_fraction),
-        }
+impl CategoryFields {
+    /// The parts of the densities; they sum to those of all particles.
+    pub fn of(found: &ParticleDensities) -> Vec<Self> {
+        let parts = found.by_category.iter();
+        parts
+            .map(|part| {
+                let (of, intervals) = (&part.density, part.density.intervals.as_deref());
+                Self {
+                    category: part.category,
+                    kind: part.kind,
+                    profiles: part.profiles,
+                    number_density: of.number_density.clone(),
+                    lower: ends(intervals, |interval| interval.lower),
+                    upper: ends(intervals, |interval| interval.upper),
+                    scalars: Scalars::of(of.total, of.mean_size, of.volume_fraction),
+                }
+            })
+            .collect()
     }
-
-    /// All categories together.
-    pub fn sum(found: &TypesUnfolding) -> Self {
-        let intervals = found.intervals.as_deref();
-        Self {
-            number_density: found.number_density.clone(),
-            lower: ends(intervals, |interval| interval.lower),
-            upper: ends(intervals, |interval| interval.upper),
-            scalars: Scalars::of(found.total, found.mean_size, found.volume_fraction),
-        }
-    }
-}
-
-/// Every category, and every type in it where types are distinguished.
-pub fn categories(of: &CategoryDensities) -> Vec<CategoryFields> {
-    let groups = of.categories.iter().zip(&of.kinds).zip(&of.found.types);
-    groups
-        .map(|((category, kind), found)| CategoryFields {
-            group: GroupFields::of(found),
-            category: *category,
-            kind: *kind,
-            profiles: found.profiles,
-            method: found.method.name(),
-            findings: found
-                .findings
-                .iter()
-                .map(|finding| Record {
-                    code: finding.code.to_owned(),
-                    message: finding.message.clone(),
-                })
-                .collect(),
-        })
-        .collect()
 }
 
 impl PercentileFields {

@@ -3,17 +3,18 @@
 mod choices;
 mod edge_rule;
 mod figures;
+mod input;
 
 use std::path::PathBuf;
 
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::files::densities::DensityRows;
-use stereology::files::profiles::{self, ProfileRow};
+use stereology::files::densities;
+use stereology::files::profiles::ProfileRow;
+use stereology::grid::LengthUnit;
 use stereology::pipeline::{
-    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, SeparateCategories, TypeFractions,
-    unfold_profiles,
+    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, TypeFractions, unfold_profiles,
 };
 use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter};
 
@@ -27,12 +28,18 @@ use stereology_report::{percent, significant};
 
 pub use choices::{Choices, Defaults, types};
 pub use edge_rule::EdgeRule;
-pub use figures::UnfoldingFields;
-use figures::{CategoryFields, GroupFields, categories};
+pub use figures::{CategoryFields, UnfoldingFields};
+use input::{Given, Input};
 
 /// Ten bins, and no confidence intervals unless requested.
 const DEFAULTS: Defaults = Defaults {
     bins: 10,
+    replicates: None,
+};
+
+/// For tables of `segment` as many bins as `synthesize` takes, so that both give the same numbers.
+const OF_SEGMENT: Defaults = Defaults {
+    bins: 16,
     replicates: None,
 };
 
@@ -41,28 +48,32 @@ const DEFAULTS: Defaults = Defaults {
 /// Reads a table of profiles (CSV with a header) and reports the number of particles per unit volume in each size bin.
 /// The expected profile counts (refolded) are reported beside the observed counts, so that the fit can be examined.
 ///
-/// PROFILES.csv has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of
+/// INPUT is a table of profiles, or a folder of `stereology segment` (or `synthesize`), whose profiles.csv is read. The
+/// table may begin with lines `# key=value`: area, min_size, unit, edge_rule, width, height. `segment` writes them, and
+/// unfolding takes area, threshold, unit and edge rule from them. An option that contradicts them is an error.
+///
+/// The table has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of
 /// --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; other columns are ignored.
-/// `stereology segment` writes such a table as profiles.csv. --area is the total area examined, which absolute numbers
-/// require. Profiles at the edges of a slice count by their `weight`, or by --edge-rule, which needs the bounding box
-/// of each profile in the columns `left`, `top`, `right`, `bottom`, and the size of a slice.
+/// --area is the total area examined, which absolute numbers require. Profiles at the edges of a slice count by their
+/// `weight`, or by --edge-rule, which needs the bounding box of each profile in the columns `left`, `top`, `right`,
+/// `bottom`, and the size of a slice.
 ///
 /// --scale multiplies all lengths, in the table and in the options.
 ///
 /// Several --shape without a `type` column share one size distribution in the given fractions (eqs. 10-12); with a
-/// `type` column each type has its own (eq. 9). Several categories are also unfolded separately, with the same bins,
-/// and summed.
+/// `type` column each type has its own (eq. 9). Categories are labels of the particles of one fit of all profiles, so
+/// their densities sum to those of all particles; the fraction of a category depends on the size of the particle.
 #[derive(Args, Debug)]
 #[command(
-    after_long_help = "Example: stereology unfold out/profiles.csv --area 307200 --bins 10 --shape rock:1 -o densities.csv"
+    after_long_help = "Example: stereology unfold seg --bins 10 --shape rock:1 -o densities.csv\n         stereology unfold profiles.csv --area 307200 --min-size 6 --shape rock:1"
 )]
 pub struct Unfold {
-    /// Table of profiles
-    #[arg(value_name = "PROFILES.csv")]
+    /// Table of profiles, or a folder of `stereology segment`
+    #[arg(value_name = "INPUT")]
     pub profiles: PathBuf,
-    /// Total area examined, in the squared unit of the sizes
+    /// Total area examined, in the squared unit of the sizes [default: that of the table]
     #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
-    pub area: f64,
+    pub area: Option<f64>,
     #[command(flatten)]
     pub choices: Choices,
     /// Tolerance of em: stop when the log-likelihood is within this bound of its maximum [default: 0.01]
@@ -75,7 +86,7 @@ pub struct Unfold {
     /// --window (for all and inside the column touches_edge suffices)
     #[arg(long, value_enum, help_heading = "Unfolding")]
     pub edge_rule: Option<EdgeRule>,
-    /// Width and height of a slice, for --edge-rule
+    /// Width and height of a slice, for --edge-rule [default: those of the table]
     #[arg(long, value_name = "WIDTH,HEIGHT", help_heading = "Unfolding")]
     pub window: Option<Window>,
     /// Estimate the fractions of several --shape from the profiles; refused if the profiles do not determine them
@@ -92,19 +103,23 @@ fn column(profiles: &[ProfileRow], of: impl Fn(&ProfileRow) -> Option<usize>) ->
     values.unwrap_or_default()
 }
 
-/// densities.csv: all together, each type, each category.
-fn rows(found: &ParticleDensities) -> DensityRows {
-    let mut rows = DensityRows::default();
-    rows.unfolding(&found.all, None, None);
-    for (kind, part) in found.by_type.iter().enumerate() {
-        rows.unfolding(part, Some(kind), None);
+/// Mean colour of the profiles of each category; empty if the table has no colours.
+fn category_colours(profiles: &[ProfileRow]) -> Vec<[f64; 3]> {
+    let categories = profiles
+        .iter()
+        .map(|profile| usize::from(profile.category.unwrap_or(0)) + 1);
+    let mut sums = vec![([0.0; 3], 0.0_f64); categories.max().unwrap_or(0)];
+    for profile in profiles {
+        let Some(colour) = profile.colour else {
+            return Vec::new();
+        };
+        let (sum, count) = &mut sums[usize::from(profile.category.unwrap_or(0))];
+        sum.iter_mut().zip(colour).for_each(|(sum, value)| *sum += value);
+        *count += 1.0;
     }
-    if let Some(of) = &found.categories {
-        for ((category, kind), part) in of.categories.iter().zip(&of.kinds).zip(&of.found.types) {
-            rows.unfolding(part, *kind, Some(usize::from(*category)));
-        }
-    }
-    rows
+    sums.into_iter()
+        .map(|(sum, count)| sum.map(|value| value / count.max(1.0)))
+        .collect()
 }
 
 /// JSON of `stereology unfold`.
@@ -115,12 +130,10 @@ pub struct UnfoldFields {
     /// Densities of each particle type; only if the table has types.
     #[serde(skip_serializing_if = "Option::is_none")]
     types: Option<Vec<TypeFields>>,
-    /// Densities of each colour category; only if there are several.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    categories: Option<Vec<CategoryFields>>,
-    /// Densities of all categories together; only if there are several.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    categories_sum: Option<GroupFields>,
+    /// Unit of all lengths; null if it is not known, or pixels.
+    unit: Option<&'static str>,
+    /// Densities of each colour category, which sum to those of all particles.
+    by_category: Vec<CategoryFields>,
     /// Largest particle size; with --max-size likelihood.
     #[serde(skip_serializing_if = "Option::is_none")]
     max_size: Option<LikelihoodFields>,
@@ -175,43 +188,64 @@ impl Unfold {
         if let Some(output) = &self.output {
             check_file(output, everywhere.force)?;
         }
-        let measured = self.measured(everywhere.scale)?;
+        let input = Input::read(&self.profiles)?;
+        let unit = input.unit(everywhere)?;
+        let stated = input.head.min_size;
+        let measured = self.measured(input, everywhere.scale)?;
         let types = self.choices.types()?;
-        let options = self.options(everywhere);
+        let options = self.options(everywhere, stated);
         let step = Step::begin("unfolding", everywhere.quiet);
         let found = unfold_profiles(&measured, &types, &options, &|done| step.at(done))
             .map_err(|error| self.failure(&error))?;
         drop(step);
         go_on()?;
         if let Some(output) = &self.output {
-            rows(&found).write(output).at(output)?;
+            densities::write(output, &found, unit).at(output)?;
         }
-        self.answer(&found)
+        self.answer(&found, unit)
     }
 
     /// The table, in the unit of the run.
-    fn measured(&self, scale: f64) -> Result<MeasuredProfiles, Failure> {
-        let mut profiles = profiles::read(&self.profiles).at(&self.profiles)?;
-        if let Some(rule) = self.edge_rule {
+    fn measured(&self, input: Input, scale: f64) -> Result<MeasuredProfiles, Failure> {
+        let window = self.window.map(|Window(sides)| sides);
+        input.check(&Given {
+            area: self.area,
+            min_size: self.choices.min_size,
+            edge_rule: self.edge_rule.map(EdgeRule::name),
+            window,
+        })?;
+        let area = input.area(self.area)?;
+        let Input { rows, head, .. } = input;
+        let mut profiles = rows;
+        // The weights of a table that states its rule are those of the rule.
+        if let Some(rule) = self.edge_rule.filter(|_| head.edge_rule.is_none()) {
             // Bounding boxes and window are both in the unit of the table, and weights have no unit.
-            rule.weigh(&mut profiles, self.window.map(|Window(sides)| sides))?;
+            rule.weigh(&mut profiles, window.or(head.window))?;
         }
         Ok(MeasuredProfiles {
             sizes: profiles.iter().map(|profile| profile.size * scale).collect(),
             weights: profiles.iter().map(|profile| profile.weight).collect(),
             categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
+            colours: category_colours(&profiles),
             slices: column(&profiles, |profile| profile.slice),
             types: column(&profiles, |profile| profile.kind),
-            area: self.area * scale * scale,
-            min_size: 0.0,
+            area: area * scale * scale,
+            min_size: head
+                .min_size
+                .map_or(0.0, |smallest| MeasuredProfiles::limit_below(smallest * scale)),
         })
     }
 
-    fn options(&self, everywhere: &Everywhere) -> DensityOptions {
+    /// The options, for a table that states this size of its smallest profiles.
+    fn options(&self, everywhere: &Everywhere, stated: Option<f64>) -> DensityOptions {
+        let defaults = if stated.is_some() { &OF_SEGMENT } else { &DEFAULTS };
         let mut options = self
             .choices
-            .density_options(everywhere.scale, everywhere.seed, &DEFAULTS);
-        options.categories = SeparateCategories::Always;
+            .density_options(everywhere.scale, everywhere.seed, defaults);
+        // The same threshold in other digits is that of the table.
+        if input::repeats(self.choices.min_size, stated) {
+            options.unfold.min_size = None;
+        }
         if self.unknown_fractions {
             options.fractions = TypeFractions::Likelihood;
         }
@@ -232,7 +266,7 @@ impl Unfold {
         Failure::run(format!("{}: {error}{advice}", self.profiles.display()))
     }
 
-    fn answer(&self, found: &ParticleDensities) -> Result<Answer, Failure> {
+    fn answer(&self, found: &ParticleDensities, unit: Option<LengthUnit>) -> Result<Answer, Failure> {
         let sum = &found.all;
         let (mut notes, settled) = (Notes::default(), &found.settled);
         for finding in &found.findings {
@@ -252,7 +286,8 @@ impl Unfold {
                 self.choices.kernel_name()
             ))
             .line(format!(
-                "particles per unit volume   {}",
+                "particles per {:<13} {}",
+                unit.map_or("unit volume".to_owned(), |unit| format!("{}\u{b3}", unit.printed())),
                 ranged(sum.total, significant)
             ))
             .line(format!(
@@ -268,7 +303,10 @@ impl Unfold {
                 significant(sum.deviance),
                 sum.degrees_of_freedom
             ))
-            .line("size bin               particles per unit volume");
+            .line(match unit {
+                Some(unit) => format!("size bin ({0})          particles per {0}\u{b3}", unit.printed()),
+                None => "size bin               particles per unit volume".to_owned(),
+            });
         for (bin, density) in sum.edges.windows(2).zip(&sum.number_density) {
             let density = density.map_or("unknown".to_owned(), significant);
             notes.line(format!(
@@ -290,8 +328,8 @@ impl Unfold {
         let fields = UnfoldFields {
             all: UnfoldingFields::of(sum, self.choices.kernel_name()),
             types: (!found.by_type.is_empty()).then(|| types.collect()),
-            categories: found.categories.as_ref().map(categories),
-            categories_sum: found.categories.as_ref().map(|of| GroupFields::sum(&of.found)),
+            unit: unit.map(LengthUnit::symbol),
+            by_category: CategoryFields::of(found),
             max_size: largest.map(|likely| estimated(&mut notes, "max size", likely, 1.0, "")),
             capping_angle: settled
                 .capping

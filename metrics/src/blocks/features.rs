@@ -27,14 +27,14 @@ pub(super) const NAMES: [&str; 17] = [
     "gradient_kurtosis",
 ];
 
-/// Differences of a feature below this are irrelevant: 5 % of a contrast or power, .05 of a correlation or fraction.
-pub(super) const RESOLUTION: f64 = 0.05;
+/// Differences of a feature below this are irrelevant: 10 % of a contrast, .1 of a correlation or fraction.
+pub(super) const RESOLUTION: f64 = 0.1;
 
 /// Pixels around a block that its filters may use.
 const MARGIN: usize = 16;
 const BANDS: usize = 3;
-/// Square of one grey level of 8 bits. It is added to all variances, so that what is not visible is no feature.
-const INVISIBLE: f64 = 1.0 / (255.0 * 255.0);
+/// Square of two grey levels of 8 bits. It is added to all variances, so that what is hardly visible is no feature.
+const INVISIBLE: f64 = 4.0 / (255.0 * 255.0);
 /// Half the side of the square over which the structure tensor is averaged.
 const REACH: usize = 3;
 

@@ -37,8 +37,8 @@ impl Figure {
 /// beyond 2 floors in 7 % of the cases and beyond 4 in 1.2 %, since the floor is the mean of three differences.
 const GOOD: f64 = 2.0;
 const CARE: f64 = 4.0;
-/// Figures that are bad before the whole comparison is bad: of 23 figures, three are bad by chance in less than .3 % of
-/// the cases if they are independent.
+/// Figures that are bad before the whole comparison is bad. If they were independent, one of 23 figures would be bad by
+/// chance in 24 % of the cases, two in 3 %, three in .3 %.
 const BAD: usize = 3;
 
 impl Figure {
@@ -119,8 +119,8 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// [`Level::Bad`] if at least three figures are, [`Level::Care`] if one or two are, else [`Level::Good`]; with the
-    /// name of the figure that is most floors from its ideal. `None` if no figure has a level.
+    /// [`Level::Bad`] if at least three figures are, [`Level::Care`] if two are, else [`Level::Good`]; with the name of
+    /// the figure that is most floors from its ideal. `None` if no figure has a level.
     #[must_use]
     pub fn verdict(&self) -> Option<(Level, &'static str)> {
         let figures = self.figures();
@@ -133,8 +133,8 @@ impl Comparison {
             .filter_map(|(name, figure)| Some((*name, figure.in_floors()?)));
         let (worst, _) = floors.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let level = match bad {
-            0 => Level::Good,
-            1..BAD => Level::Care,
+            0 | 1 => Level::Good,
+            2..BAD => Level::Care,
             _ => Level::Bad,
         };
         Some((level, worst))

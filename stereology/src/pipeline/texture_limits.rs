@@ -17,6 +17,10 @@ pub struct TextureLimits {
 /// in power. Textures without large structures reach .0001 to .008.
 const BANDS: f64 = 0.05;
 
+/// Side in voxels from which the error of the bands counts: a smaller volume has too few features for the grey levels
+/// and the power of a coarse texture at once.
+const LARGE: usize = 64;
+
 /// Differences of features in standard deviations that are worth naming.
 const NAMED: f64 = 0.7;
 
@@ -30,7 +34,8 @@ const DIRECTIONS: [&str; 3] = ["anisotropy", "direction_along", "direction_diago
 /// depend on each other: edges, chips, cracks, layers and two-phase materials become speckle. The finding
 /// `beyond-heeger-bergen` is made if the block test is [`Level::Bad`] (false alarms: less than one in a hundred for
 /// textures finer than a tenth of a block), or if `band_error`, the error of the band statistics of the volume
-/// ([`final_error`](stereology_pyramid::TextureReport::final_error)), exceeds .05. Cost: about 1 s, independent of the
+/// ([`final_error`](stereology_pyramid::TextureReport::final_error)), exceeds .05 in a volume of at least 64 voxels
+/// along each axis. Cost: about 1 s, independent of the
 /// size of the volume.
 ///
 /// # Examples
@@ -78,6 +83,8 @@ pub fn texture_limits(
         let order = a.level().cmp(&b.level());
         order.then(a.accuracy.total_cmp(&b.accuracy))
     });
+    let (nz, ny, nx, _) = volume.dim();
+    let band_error = if nz.min(ny).min(nx) < LARGE { 0.0 } else { band_error };
     let finding = finding(blocks.as_ref(), band_error, exemplars.len() > 1);
     TextureLimits { blocks, finding }
 }

@@ -153,8 +153,8 @@ impl JsonSchema for Figures {
 /// The verdict on a solid.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct VerdictFields {
-    /// bad if the classifier or at least three figures are bad; care if the classifier needs care or one or two figures
-    /// are bad; else good. Null if nothing has a level.
+    /// bad if the classifier or at least three figures are bad; care if the classifier needs care or two figures are
+    /// bad; else good. Null if nothing has a level.
     #[schemars(with = "Option<String>")]
     level: Option<Level>,
     /// What decides: `classifier`, or the figure that is most floors from its ideal.

@@ -146,9 +146,9 @@ pub(crate) fn synthesize(
     let levels = levels(exemplars, domain, options, &recipe)?;
     let views = options.views.count();
     let exemplars = &exemplars[..exemplars.len().min(views)];
+    let colours = exemplars[0].inner_colours();
     let atlas = Atlas::new(exemplars);
-    let channels = exemplars[0].channels();
-    let window = Window::new(options.neighbourhood, channels, options.causal);
+    let window = Window::new(options.neighbourhood, exemplars[0].channels(), options.causal);
     let stacks: Vec<Vec<Vec<f32>>> = exemplars.iter().map(|exemplar| smoothed(exemplar, levels)).collect();
     let voxels_of = |level: usize| domain.size().map(|n| n.div_ceil(1 << level)).iter().product::<usize>() as f64;
     let all: f64 = (0..levels).map(voxels_of).sum();
@@ -156,7 +156,9 @@ pub(crate) fn synthesize(
     let mut before: Option<(Field, Level)> = None;
     let mut reports = Vec::new();
     let mut voxel_iterations = 0;
-    for number in (0..levels).rev() {
+    let mut number = levels;
+    loop {
+        number -= 1;
         let level = Level::new(exemplars, &stacks, &atlas, number, window.half, recipe.thinned);
         let mut field = field_at(domain, number, exemplars, &level);
         match before.take() {
@@ -168,68 +170,22 @@ pub(crate) fn synthesize(
             }
             Some((coarse, from)) => field.refine(&coarse, &from, &level, &atlas, recipe.combine != Combine::Discrete),
         }
-        let stage = Stage::new(
-            &level,
-            &atlas,
-            &window,
-            &recipe,
-            options.search,
-            exemplars[0].inner_colours(),
-        );
-        let mut tallies = stage.tally(&field);
-        let mut energies = Vec::new();
-        let fraction = voxels_of(number) / all / options.iterations as f64;
-        let order = match options.solver() {
-            Solver::Sequential => options.scan.order(field.size, options.seed),
-            Solver::Batch => Vec::new(),
-        };
-        for iteration in 0..options.iterations {
-            let cancelled = |flow: ControlFlow<()>| {
-                if flow.is_break() {
-                    Err(SolidError::Cancelled)
-                } else {
-                    Ok(())
-                }
-            };
-            cancelled(progress(done))?;
-            let mut unchanged = false;
-            match options.solver() {
-                Solver::Batch => {
-                    let go_on = |part: f64| progress(done + part * fraction * 0.75);
-                    let ControlFlow::Continue(energy) = stage.search(&mut field, &mut tallies, iteration, &go_on)
-                    else {
-                        return Err(SolidError::Cancelled);
-                    };
-                    energies.push(energy);
-                    cancelled(progress(done + fraction * 0.75))?;
-                    stage.vote(&mut field, &mut tallies, recipe.radius(iteration, options.iterations));
-                }
-                Solver::Sequential => {
-                    let swept = stage.sweep(&mut field, &mut tallies, &order, &|part| {
-                        progress(done + part * fraction)
-                    });
-                    match swept {
-                        ControlFlow::Continue((energy, changed)) => {
-                            energies.push(energy);
-                            unchanged = changed == 0;
-                        }
-                        ControlFlow::Break(()) => return Err(SolidError::Cancelled),
-                    }
-                }
-            }
+        let stage = Stage::new(&level, &atlas, &window, &recipe, options.search, colours);
+        let part = voxels_of(number) / all;
+        let go_on = |share: f64| progress(done + share * part);
+        let ControlFlow::Continue(energies) = iterate(&stage, &mut field, options, &go_on, &mut |field, at, energy| {
             watch(&Iteration {
                 coarser_by: number,
-                number: iteration + 1,
-                energy: energies.last().copied().unwrap_or_default(),
-                field: &field,
-                colours: exemplars[0].inner_colours(),
+                number: at,
+                energy,
+                field,
+                colours,
             });
-            voxel_iterations += field.voxels() as u64;
-            done += fraction;
-            if unchanged {
-                break;
-            }
-        }
+        }) else {
+            return Err(SolidError::Cancelled);
+        };
+        done += part;
+        voxel_iterations += (field.voxels() * energies.len()) as u64;
         reports.push(LevelReport {
             size: field.size,
             energies,
@@ -242,21 +198,57 @@ pub(crate) fn synthesize(
                 let labels = stage.settle_phases(&mut field, phases.len());
                 labels.into_iter().map(|label| phases[usize::from(label)]).collect()
             });
-            drop(stage);
             return Ok(finished(
                 field,
                 &level,
                 &atlas,
                 labels,
-                exemplars[0].inner_colours(),
+                colours,
                 reports,
                 voxel_iterations,
             ));
         }
-        drop(stage);
         before = Some((field, level));
     }
-    unreachable!("there is at least one level, and the last one returns")
+}
+
+/// The iterations of one level, up to the one that changes nothing; returns the energy of each. `watch` receives the
+/// field, the number of the iteration (from 1) and its energy.
+fn iterate(
+    stage: &Stage<'_>,
+    field: &mut Field,
+    options: &SolidOptions,
+    progress: Progress<'_>,
+    watch: &mut dyn FnMut(&Field, usize, f64),
+) -> ControlFlow<(), Vec<f64>> {
+    let order = match options.solver() {
+        Solver::Sequential => options.scan.order(field.size, options.seed),
+        Solver::Batch => Vec::new(),
+    };
+    let mut tallies = stage.tally(field);
+    let mut energies = Vec::new();
+    for iteration in 0..options.iterations {
+        let go_on = |share: f64| progress((iteration as f64 + share) / options.iterations as f64);
+        go_on(0.0)?;
+        let (energy, changed) = match options.solver() {
+            Solver::Batch => {
+                let energy = stage.search(field, &mut tallies, iteration, &|share| go_on(0.75 * share))?;
+                go_on(0.75)?;
+                stage.vote(field, &mut tallies, stage.recipe.radius(iteration, options.iterations));
+                (energy, true)
+            }
+            Solver::Sequential => {
+                let (energy, changed) = stage.sweep(field, &mut tallies, &order, &go_on)?;
+                (energy, changed > 0)
+            }
+        };
+        energies.push(energy);
+        watch(field, iteration + 1, energy);
+        if !changed {
+            break;
+        }
+    }
+    ControlFlow::Continue(energies)
 }
 
 /// The result of the finest level; phases have `labels` instead of values.

@@ -29,15 +29,15 @@ use crate::planes::image_layout;
 /// ```
 /// use ndarray::Array3;
 /// use std::ops::ControlFlow;
-/// use stereology_grow::{GrowOptions, grow_picture};
+/// use stereology_grow::{GrowOptions, grow_image};
 ///
 /// let stripes = Array3::from_shape_fn((20, 20, 1), |(y, _, _)| (y / 2 % 2) as f32);
 /// let options = GrowOptions::default().with_window(7);
-/// let grown = grow_picture(stripes.view(), [30, 40], &options, &|_| ControlFlow::Continue(()))?;
+/// let grown = grow_image(stripes.view(), [30, 40], &options, &|_| ControlFlow::Continue(()))?;
 /// assert!((0..30).all(|y| (1..40).all(|x| grown[[y, x, 0]] == grown[[y, 0, 0]])));
 /// # Ok::<(), stereology_grow::GrowError>(())
 /// ```
-pub fn grow_picture(
+pub fn grow_image(
     exemplar: ArrayView3<'_, f32>,
     [height, width]: [usize; 2],
     options: &GrowOptions,

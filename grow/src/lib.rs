@@ -63,7 +63,7 @@ mod voxels;
 pub use error::GrowError;
 pub use flood_fill::{FloodFill, flood_fill};
 pub use growth::{Grown, grow};
-pub use image::grow_picture;
+pub use image::grow_image;
 pub use options::GrowOptions;
 pub use planes::Planes;
 pub use resolutions::{LevelOptions, synthesize_by_levels};

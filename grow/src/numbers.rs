@@ -3,7 +3,7 @@
 /// Most voxels of a box, and most samples of an exemplar: the largest number is kept free.
 pub(crate) const MOST: usize = u32::MAX as usize;
 
-/// Number of a voxel, texel, cell, round or node. All are fewer than [`MOST`]: `grow`, `grow_picture` and
+/// Number of a voxel, texel, cell, round or node. All are fewer than [`MOST`]: `grow`, `grow_image` and
 /// `synthesize_by_levels` refuse larger boxes and exemplars.
 #[allow(clippy::cast_possible_truncation, reason = "callers check sizes against MOST")]
 pub(crate) fn number(index: usize) -> u32 {

@@ -104,7 +104,7 @@ pub struct DualGraph {
     starts: Vec<u32>,
     links: Vec<Link>,
     areas: Vec<f64>,
-    pieces: Vec<Vec<u32>>,
+    components: Vec<Vec<u32>>,
     mean_length: f64,
 }
 
@@ -227,10 +227,10 @@ impl DualGraph {
             starts,
             links,
             areas,
-            pieces: Vec::new(),
+            components: Vec::new(),
             mean_length,
         };
-        graph.pieces = graph.connected();
+        graph.components = graph.connected();
         graph
     }
 
@@ -259,8 +259,8 @@ impl DualGraph {
 
     /// The connected components, each a list of triangles, in order of their lowest triangle.
     #[must_use]
-    pub fn pieces(&self) -> &[Vec<u32>] {
-        &self.pieces
+    pub fn components(&self) -> &[Vec<u32>] {
+        &self.components
     }
 
     /// Mean length of an edge.

@@ -125,7 +125,7 @@ mod tests {
         let patches = Patches::new(&fine, 0.12);
         let areas = |graph: &DualGraph| graph.areas().iter().sum::<f64>();
         assert!((areas(&fine) - areas(&patches.graph)).abs() < 1e-9);
-        assert!(patches.graph.len() < fine.len() / 10 && patches.graph.pieces().len() == 1);
+        assert!(patches.graph.len() < fine.len() / 10 && patches.graph.components().len() == 1);
         let (near, far) = (fine.distances(&[(0, 0.0)]), patches.graph.distances(&[(0, 0.0)]));
         for (patch, &t) in patches.centres.iter().enumerate() {
             let (true_one, found) = (near[t as usize], far[patch]);

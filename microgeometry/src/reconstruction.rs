@@ -140,7 +140,7 @@ pub struct Reconstruction {
     /// Bins with less than their required fraction, farthest from the interface first.
     pub shortfalls: Vec<Shortfall>,
     /// Number of connected components of the mesh, each of which got its fraction of the distribution.
-    pub pieces: usize,
+    pub components: usize,
 }
 
 /// A bin that could not be filled.
@@ -335,7 +335,7 @@ fn describe(
         left_over: made.left_over,
         misplaced,
         shortfalls,
-        pieces: graph.pieces().len(),
+        components: graph.components().len(),
         labels,
     })
 }

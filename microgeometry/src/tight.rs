@@ -98,9 +98,9 @@ impl Tight<'_> {
         }
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let dice: Vec<f32> = (0..count).map(|_| random.random()).collect();
-        let mut rest_rooms = vec![[0_i64; 2]; self.graph.pieces().len()];
+        let mut rest_rooms = vec![[0_i64; 2]; self.graph.components().len()];
         let mut done = 0;
-        for (number, piece) in self.graph.pieces().iter().enumerate() {
+        for (number, piece) in self.graph.components().iter().enumerate() {
             let weight: i64 = piece.iter().map(|&t| self.weights[t as usize]).sum();
             let mut room = take_share(&mut rest, weight);
             room.iter_mut().for_each(|side| side.resize(levels, 0));
@@ -322,7 +322,7 @@ impl Tight<'_> {
         // In the bins beside the interface, if the bounds allow it.
         let within = self.bin * (1.0 - 1e-9);
         let mut left = 0;
-        for (piece, rest) in self.graph.pieces().iter().zip(rest_rooms) {
+        for (piece, rest) in self.graph.components().iter().zip(rest_rooms) {
             let open: Vec<u32> = piece.iter().copied().filter(|&t| !state.labelled[t as usize]).collect();
             if open.is_empty() {
                 continue;

@@ -4,7 +4,7 @@
 
 use ndarray::Array3;
 use std::ops::ControlFlow;
-use stereology::grow::{GrowOptions, grow_picture};
+use stereology::grow::{GrowOptions, grow_image};
 use stereology::pipeline::{CompareOptions, compare_solid};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         0.5 + 0.25 * (0.5 * x + 0.2 * y).sin() + 0.25 * (0.35 * y - 0.1 * x).cos()
     });
     for window in [0, 5, 9] {
-        let grown = grow_picture(
+        let grown = grow_image(
             exemplar.view(),
             [64, 64],
             &GrowOptions::default().with_window(window),

@@ -47,9 +47,9 @@
 #[cfg(feature = "pipeline")]
 pub mod files;
 #[cfg(feature = "pipeline")]
-pub mod pictures;
-#[cfg(feature = "pipeline")]
 pub mod pipeline;
+#[cfg(feature = "pipeline")]
+pub mod renderings;
 #[cfg(feature = "pipeline")]
 pub mod sample;
 

@@ -360,7 +360,7 @@ impl Displace {
             emd_labels: made.emd_labels,
             emd_measured: made.emd_measured,
             shortfalls: shortfalls.collect(),
-            pieces: made.pieces,
+            pieces: made.components,
             border_edges: census.border,
             crowded_edges: census.crowded,
             self_intersections: crossings,
@@ -393,10 +393,10 @@ impl Displace {
                 counted(census.border as u64)
             ));
         }
-        if made.pieces > 1 {
+        if made.components > 1 {
             notes.line(format!(
                 "{} connected components, each with its part of the distribution",
-                made.pieces
+                made.components
             ));
         }
         if census.crowded > 0 {

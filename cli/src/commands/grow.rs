@@ -13,7 +13,7 @@ use serde::Serialize;
 use stereology::exemplar::SolidError;
 use stereology::files::voxel_table::ValueRange;
 use stereology::grid::{Element, Format, SampleType, VolumeShape, VoxelSize, read_volume, write_volume};
-use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_picture, synthesize_by_levels};
+use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_image, synthesize_by_levels};
 use stereology::metrics::seams;
 use stereology::pipeline::finish_grown;
 use stereology::segment::read_photo;
@@ -386,7 +386,7 @@ impl Grow {
         let step = Step::begin("grow", everywhere.quiet);
         let progress = |done: f64| step.at(done);
         let made = match self.levels {
-            None => grow_picture(
+            None => grow_image(
                 image.samples.view(),
                 [height, width],
                 &self.options(everywhere.seed, 1),

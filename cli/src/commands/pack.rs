@@ -1,14 +1,14 @@
 //! `stereology pack`: particles without overlap in a periodic box.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::anneal::{
-    self, Grain, PackError, PackOptions, SizeDensities, SizeInBin, box_for_fraction, count_to_fill,
+    self, Grain, PackError, PackOptions, Packing, SizeDensities, SizeInBin, box_for_fraction, count_to_fill,
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
 };
 use stereology::files::packing::PackingFile;
@@ -246,21 +246,7 @@ impl Pack {
         if !(0.005..=1.0).contains(&self.tolerance) {
             return Err(Failure::usage("--tolerance: a fraction from 0.005 to 1 is needed"));
         }
-        check_file(&self.output, everywhere.force)?;
-        if let Some(path) = &self.surfaces {
-            particle_surfaces::check_ending(path)?;
-        }
-        for path in self.picture.iter().chain(&self.trace).chain(&self.surfaces) {
-            check_file(path, everywhere.force)?;
-        }
-        let also = self
-            .also
-            .iter()
-            .map(|path| Ok((path, ParticleFormat::of(path)?)))
-            .collect::<Result<Vec<_>, Failure>>()?;
-        for path in &self.also {
-            check_file(path, everywhere.force)?;
-        }
+        let also = self.check_outputs(everywhere.force)?;
         let started = Instant::now();
         let unit = self.unit(everywhere)?;
         let Shapes { names, shares, bodies } = self.shapes()?;
@@ -280,47 +266,10 @@ impl Pack {
         .map_err(pack_failure)?;
         drop(step);
         go_on()?;
-        for (path, format) in also {
-            format.write(path, &packing, unit)?;
-        }
-        if let Some(path) = &self.surfaces {
-            particle_surfaces::write(path, packing.bodies(), packing.particles())?;
-        }
-        if let Some(path) = &self.picture {
-            write_png(path, &pack_quality::picture(&packing).or_fail()?)?;
-        }
-        if let Some(path) = &self.trace {
-            write_text(path, &pack_quality::trace(&packing))?;
-        }
-        PackingFile::new(names, packing.particles(), packing.period())
-            .with_unit(unit)
-            .write(&self.output)
-            .at(&self.output)?;
+        self.write(&also, &packing, names, unit)?;
 
         let sides: [f64; 3] = packing.sides().into();
-        let mut notes = Notes::default();
-        notes
-            .seconds(started.elapsed().as_secs_f64())
-            .line(format!(
-                "{} particles in a box of {}",
-                packing.particles().len(),
-                sides.map(significant).join(" x ")
-            ))
-            .line(format!(
-                "{} of the volume; no two overlap (certified by a separate pass)",
-                percent(packing.fraction())
-            ))
-            .line(format!(
-                "{} iterations, {} s",
-                packing.iterations(),
-                significant(started.elapsed().as_secs_f64())
-            ));
-        if let Some(expected) = expected {
-            notes.line(format!(
-                "{} expected from the densities; cumulative numbers are rounded to whole particles",
-                significant(expected)
-            ));
-        }
+        let mut notes = notes(&packing, started.elapsed(), expected);
         let fields = PackFields {
             particles: packing.particles().len(),
             sides,
@@ -338,6 +287,47 @@ impl Pack {
                 .then(|| pack_quality::quality(&packing, everywhere.seed, &mut notes)),
         };
         Answer::new(&fields, notes)
+    }
+
+    /// Checks that all outputs can be written; returns those of `--also` with their formats.
+    fn check_outputs(&self, force: bool) -> Result<Vec<(&Path, ParticleFormat)>, Failure> {
+        check_file(&self.output, force)?;
+        if let Some(path) = &self.surfaces {
+            particle_surfaces::check_ending(path)?;
+        }
+        for path in self.picture.iter().chain(&self.trace).chain(&self.surfaces) {
+            check_file(path, force)?;
+        }
+        let also = self.also.iter().map(|path| {
+            check_file(path, force)?;
+            Ok((path.as_path(), ParticleFormat::of(path)?))
+        });
+        also.collect()
+    }
+
+    fn write(
+        &self,
+        also: &[(&Path, ParticleFormat)],
+        packing: &Packing,
+        names: Vec<String>,
+        unit: Option<LengthUnit>,
+    ) -> Result<(), Failure> {
+        for (path, format) in also {
+            format.write(path, packing, unit)?;
+        }
+        if let Some(path) = &self.surfaces {
+            particle_surfaces::write(path, packing.bodies(), packing.particles())?;
+        }
+        if let Some(path) = &self.picture {
+            write_png(path, &pack_quality::picture(packing).or_fail()?)?;
+        }
+        if let Some(path) = &self.trace {
+            write_text(path, &pack_quality::trace(packing))?;
+        }
+        PackingFile::new(names, packing.particles(), packing.period())
+            .with_unit(unit)
+            .write(&self.output)
+            .at(&self.output)
     }
 
     /// The unit of the table of sizes or densities, or of the options.
@@ -513,4 +503,33 @@ fn no_such_shape(table: &Path, shape: usize, shapes: usize) -> Failure {
         "{}: a row has type {shape}, but there are {shapes} --shape (types are numbered from 0)",
         table.display()
     ))
+}
+
+/// What the packing is like.
+fn notes(packing: &Packing, time: Duration, expected: Option<f64>) -> Notes {
+    let sides: [f64; 3] = packing.sides().into();
+    let mut notes = Notes::default();
+    notes
+        .seconds(time.as_secs_f64())
+        .line(format!(
+            "{} particles in a box of {}",
+            packing.particles().len(),
+            sides.map(significant).join(" x ")
+        ))
+        .line(format!(
+            "{} of the volume; no two overlap (certified by a separate pass)",
+            percent(packing.fraction())
+        ))
+        .line(format!(
+            "{} iterations, {} s",
+            packing.iterations(),
+            significant(time.as_secs_f64())
+        ));
+    if let Some(expected) = expected {
+        notes.line(format!(
+            "{} expected from the densities; cumulative numbers are rounded to whole particles",
+            significant(expected)
+        ));
+    }
+    notes
 }

@@ -9,8 +9,8 @@ use serde::Serialize;
 use stereology::anneal::{
     Distance, Packing, bond_order, carnahan_starling, orientation_tensor, radial_distribution, section_test,
 };
-use stereology::pictures::picture_of_packing;
 use stereology::render::{RenderError, RenderOptions};
+use stereology::renderings::render_packing;
 
 use crate::answer::Notes;
 use stereology_report::significant;
@@ -131,5 +131,5 @@ pub fn picture(packing: &Packing) -> Result<RgbImage, RenderError> {
         gloss: 0.15,
         ..RenderOptions::default().with_size(800, 720)
     };
-    picture_of_packing(packing, &colour, &options)
+    render_packing(packing, &colour, &options)
 }

@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::pictures::picture_of_solid;
 use stereology::render::{BlockOptions, Camera, RenderError, RenderOptions};
+use stereology::renderings::render_solid;
 use stereology::shape::{TriangleMesh, read_mesh};
 use stereology::volume::{Solid, turned};
 
@@ -125,15 +125,14 @@ impl Render {
                 azimuth: camera.azimuth + 360.0 * k as f64 / files.len() as f64,
                 ..camera
             };
-            let picture =
-                picture_of_solid(&solid, &mesh, place, &from, &options, &part).map_err(|error| match error {
-                    RenderError::Cancelled => Failure::stopped(),
-                    RenderError::Options { .. } => Failure::usage(error.to_string()),
-                    error => Failure::run(match &self.mesh {
-                        Some(path) => format!("{}: {error}", path.display()),
-                        None => error.to_string(),
-                    }),
-                })?;
+            let picture = render_solid(&solid, &mesh, place, &from, &options, &part).map_err(|error| match error {
+                RenderError::Cancelled => Failure::stopped(),
+                RenderError::Options { .. } => Failure::usage(error.to_string()),
+                error => Failure::run(match &self.mesh {
+                    Some(path) => format!("{}: {error}", path.display()),
+                    None => error.to_string(),
+                }),
+            })?;
             write_png(file, &picture)?;
         }
         drop(step);

@@ -11,13 +11,13 @@ use serde_json::{Map, Value, json};
 use stereology::anneal::PackOptions;
 use stereology::files;
 use stereology::grid::{Format, LengthUnit};
-use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{
     self, Comparison, DensityError, Extent, Finished, ParticleTypes, PopulationFailure, Synthesis, SynthesisError,
     SynthesisOptions,
 };
 use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
+use stereology::renderings::render_solid;
 use stereology::sample;
 use stereology::segment::{PhotoFile, read_labels_for, read_photo_up_to};
 use stereology::shape::TriangleMesh;
@@ -550,7 +550,7 @@ fn cube(solid: &stereology::volume::Solid) -> Result<RgbImage, Failure> {
         camera,
         render: picture,
     } = BlockOptions::default();
-    picture_of_solid(
+    render_solid(
         solid,
         &block,
         &|p| *p,

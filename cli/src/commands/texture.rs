@@ -11,9 +11,9 @@ use ndarray::{Array3, Axis};
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::grid::{Format, VolumeShape, VoxelSize, write_atomically, write_volume};
-use stereology::pipeline::{image_texture_limits, texture_limits};
+use stereology::pipeline::{TextureLimits, image_texture_limits, texture_limits};
 use stereology::pyramid::{
-    self, Exemplar, TextureOptions, TextureReport, synthesize_image_with_report, synthesize_oriented_volume,
+    self, Exemplar, TextureOptions, TextureReport, Watch, synthesize_image_with_report, synthesize_oriented_volume,
     synthesize_volume_with_report,
 };
 use stereology::segment::read_photo;
@@ -181,6 +181,13 @@ enum Target {
     Volume([usize; 3], Format),
 }
 
+/// A texture that was written, and what is known about it.
+struct Made {
+    shape: Vec<usize>,
+    report: TextureReport,
+    limits: TextureLimits,
+}
+
 /// JSON of `stereology texture`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct TextureFields {
@@ -229,7 +236,6 @@ impl Texture {
             ));
         }
         check_file(&self.output, everywhere.force)?;
-        let path = &self.images[0];
         let pictures = self
             .images
             .iter()
@@ -237,7 +243,6 @@ impl Texture {
             .collect::<Result<Vec<_>, _>>()?;
         let channels = if pictures.iter().all(is_grey) { 1 } else { 3 };
         let samples: Vec<Array3<f32>> = pictures.iter().map(|picture| samples(picture, channels)).collect();
-        let exemplars: Vec<Exemplar<'_>> = samples.iter().map(|samples| Exemplar::new(samples.view())).collect();
         let step = Step::begin("texture", everywhere.quiet);
         let shown = AtomicUsize::new(0);
         let watch = |done: f64, report: &TextureReport| {
@@ -247,21 +252,54 @@ impl Texture {
             }
             step.at(done)
         };
-        let (shape, report, limits) = match target {
+        let made = self.synthesize(target, &samples, &options, &watch, everywhere)?;
+        let notes = self.notes(&made, mode);
+        let Made { shape, report, limits } = made;
+        let fields = TextureFields {
+            shape,
+            mode: mode.name(),
+            iterations: self.choices.iterations,
+            levels: report.levels,
+            orientations: self.choices.orientations,
+            settled: report.has_settled(),
+            final_error: report.final_error,
+            classifier: limits.blocks.as_ref().map(ClassifierFields::of),
+            band_errors: report.band_errors,
+            slice_errors: report.slice_errors,
+        };
+        Answer::new(&fields, notes)
+    }
+
+    /// Synthesises and writes the texture.
+    fn synthesize(
+        &self,
+        target: Target,
+        samples: &[Array3<f32>],
+        options: &TextureOptions,
+        watch: Watch<'_>,
+        everywhere: &Everywhere,
+    ) -> Result<Made, Failure> {
+        let exemplars: Vec<Exemplar<'_>> = samples.iter().map(|samples| Exemplar::new(samples.view())).collect();
+        Ok(match target {
             Target::Picture(size) => {
-                let (made, report) = synthesize_image_with_report(&exemplars[0], size, &options, &watch).at(path)?;
+                let (made, report) =
+                    synthesize_image_with_report(&exemplars[0], size, options, watch).at(&self.images[0])?;
                 go_on()?;
                 write_picture(&self.output, &made)?;
                 let limits = image_texture_limits(samples[0].view(), made.view(), everywhere.seed);
-                (made.shape().to_vec(), report, limits)
+                Made {
+                    shape: made.shape().to_vec(),
+                    report,
+                    limits,
+                }
             }
             Target::Volume(size, format) => {
-                let (made, report) = if several {
-                    synthesize_oriented_volume(&exemplars, size, &options, &watch)
+                let (made, report) = if exemplars.len() > 1 {
+                    synthesize_oriented_volume(&exemplars, size, options, watch)
                 } else {
-                    synthesize_volume_with_report(&exemplars[0], size, &options, &watch)
+                    synthesize_volume_with_report(&exemplars[0], size, options, watch)
                 }
-                .at(path)?;
+                .at(&self.images[0])?;
                 go_on()?;
                 let (nz, ny, nx, channels) = made.dim();
                 write_volume::<u8>(
@@ -284,42 +322,54 @@ impl Texture {
                 .at(&self.output)?;
                 let views: Vec<_> = samples.iter().map(|samples| samples.view()).collect();
                 let limits = texture_limits(&views, made.view(), report.final_error, everywhere.seed);
-                (made.shape().to_vec(), report, limits)
+                Made {
+                    shape: made.shape().to_vec(),
+                    report,
+                    limits,
+                }
             }
-        };
+        })
+    }
+
+    /// What was made, and how well.
+    fn notes(&self, made: &Made, mode: Mode) -> Notes {
         let mut notes = Notes::default();
         notes
             .line(format!(
                 "{} samples written to {}",
-                shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
+                made.shape
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join(" x "),
                 self.output.display()
             ))
             .line(format!(
                 "mode {}, {} iterations, {} levels",
                 mode.name(),
                 self.choices.iterations,
-                report.levels
+                made.report.levels
             ))
             .line(format!(
                 "error of the sub-band statistics before each iteration: {}",
-                listed(&report.band_errors)
+                listed(&made.report.band_errors)
             ));
-        if !report.slice_errors.is_empty() {
+        if !made.report.slice_errors.is_empty() {
             notes.line(format!(
                 "error of the section statistics after each iteration: {}; at the end: {:.4}",
-                listed(&report.slice_errors),
-                report.final_error
+                listed(&made.report.slice_errors),
+                made.report.final_error
             ));
         }
-        notes.line(if report.has_settled() {
+        notes.line(if made.report.has_settled() {
             "converged: further iterations would change little"
         } else {
             "not converged: more --iterations may reduce the error of the sub-band statistics"
         });
-        for finding in &report.findings {
+        for finding in &made.report.findings {
             notes.warn(Warning::new(finding.code, finding.message.clone()));
         }
-        if let Some(test) = &limits.blocks {
+        if let Some(test) = &made.limits.blocks {
             notes.line(format!(
                 "classifier: {:.0} % of {} blocks of {} pixels are distinguished from the image's, p {:.3}",
                 100.0 * test.accuracy,
@@ -328,22 +378,10 @@ impl Texture {
                 test.p_value
             ));
         }
-        if let Some(finding) = limits.finding {
-            notes.warn(finding);
+        if let Some(finding) = &made.limits.finding {
+            notes.warn(finding.clone());
         }
-        let fields = TextureFields {
-            shape,
-            mode: mode.name(),
-            iterations: self.choices.iterations,
-            levels: report.levels,
-            orientations: self.choices.orientations,
-            settled: report.has_settled(),
-            final_error: report.final_error,
-            classifier: limits.blocks.as_ref().map(ClassifierFields::of),
-            band_errors: report.band_errors,
-            slice_errors: report.slice_errors,
-        };
-        Answer::new(&fields, notes)
+        notes
     }
 
     fn target(&self) -> Result<Target, Failure> {

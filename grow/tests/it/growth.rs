@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
 use stereology_grow::{
-    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, grow, grow_picture, synthesize_by_levels,
+    GrowError, GrowOptions, Grown, LevelOptions, Planes, Search, Voxels, grow, grow_image, synthesize_by_levels,
 };
 use stereology_metrics::seams;
 use stereology_shape::{ClosedMesh, TriangleMesh};
@@ -259,7 +259,7 @@ fn invalid_inputs_are_refused() {
 #[test]
 fn images_are_made_of_texels() {
     let exemplar = stone(50);
-    let one = grow_picture(exemplar.view(), [40, 60], &GrowOptions::default().with_window(7), &go).unwrap();
+    let one = grow_image(exemplar.view(), [40, 60], &GrowOptions::default().with_window(7), &go).unwrap();
     let other = synthesize_by_levels(exemplar.view(), [40, 60], &LevelOptions::default(), &go).unwrap();
     for made in [one, other] {
         assert_eq!(made.dim(), (40, 60, 1));

@@ -91,7 +91,7 @@ fn pieces_get_their_shares() {
         &of,
         &ReconstructOptions::default().with_weighting(Weighting::Count),
     );
-    assert_eq!(made.pieces, 2);
+    assert_eq!(made.components, 2);
     for piece in made.labels.chunks(5120) {
         let share = piece.iter().filter(|x| !x.is_sign_negative()).count() as f64 / 5120.0;
         assert!((share - of.positive_share()).abs() < 0.02, "{share}");

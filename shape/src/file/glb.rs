@@ -187,9 +187,15 @@ impl Glb {
     ///
     /// Single precision is too coarse for a mesh far from the origin, so positions are relative to the centre of the
     /// bounding box, and the node's translation is that centre.
+    ///
+    /// # Errors
+    ///
+    /// If a coordinate is not finite or too large for single precision, a normal is not finite, the mesh takes more than
+    /// 4 GB, or `out` fails.
     pub(crate) fn write(mut self, out: &mut impl Write, mesh: &TriangleMesh, corners: &Corners) -> io::Result<()> {
         let bounds = bounds(mesh);
         let centre = nalgebra::center(&bounds[0], &bounds[1]);
+        check_numbers(mesh, corners, centre)?;
         self.add_positions(mesh, corners, bounds, centre);
         let normals = self.float_accessor(corners.of.iter().flat_map(|corner| corner.normal), Type::Vec3);
         self.add_attribute(Semantic::Normals, normals);
@@ -277,6 +283,27 @@ fn write_chunks(out: &mut impl Write, mut json: Vec<u8>, data: &[u8]) -> io::Res
         out.write_all(chunk)?;
     }
     Ok(())
+}
+
+/// glTF has no place for infinities and values that are not numbers.
+#[allow(clippy::cast_possible_truncation, reason = "GLB is single precision")]
+fn check_numbers(mesh: &TriangleMesh, corners: &Corners, centre: Point3<f64>) -> io::Result<()> {
+    let bad = |corner: &&Corner| {
+        let position = mesh.vertices[corner.vertex as usize] - centre;
+        let is_finite = position.iter().all(|x| (*x as f32).is_finite())
+            && corner.normal.iter().chain(&corner.uv).all(|x| x.is_finite());
+        !is_finite
+    };
+    match corners.of.iter().find(bad) {
+        None => Ok(()),
+        Some(corner) => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!(
+                "vertex {}: its position, normal or place in the texture is not finite, or too large for single precision",
+                corner.vertex
+            ),
+        )),
+    }
 }
 
 fn bounds(mesh: &TriangleMesh) -> [Point3<f64>; 2] {

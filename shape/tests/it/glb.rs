@@ -244,3 +244,25 @@ fn an_incomplete_mesh_is_not_written() {
     let error = write_textured_mesh(path.with_extension("ply"), &good).unwrap_err();
     assert!(matches!(error, MeshFileError::Ending { .. }));
 }
+
+/// glTF has no infinities: a mesh with one position, normal or texture coordinate that is not finite is not written.
+#[test]
+fn what_is_not_finite_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh.glb");
+    let refused = |mesh: &TexturedMesh| {
+        let error = write_textured_mesh(&path, mesh).unwrap_err().to_string();
+        assert!(error.contains("not finite") && !path.exists(), "{error}");
+    };
+    for bad in [f64::NAN, f64::INFINITY, 1e39] {
+        let mut mesh = textured(255);
+        mesh.mesh.vertices[3].y = bad;
+        refused(&mesh);
+    }
+    let mut mesh = textured(255);
+    mesh.normals[5][1] = Vector3::repeat(f64::NAN);
+    refused(&mesh);
+    let mut mesh = textured(255);
+    mesh.uvs[2][0] = [0.5, f64::INFINITY];
+    refused(&mesh);
+}

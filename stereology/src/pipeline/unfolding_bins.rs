@@ -17,6 +17,14 @@ pub struct UnfoldingBins {
 
 /// With a hundred profile bins or more the loss of information does not show in the densities.
 const PROFILE_BINS: usize = 100;
+
+/// Number of profile bins: as many, rounded up so that an even number of them makes a reported bin. Histograms show
+/// halves of the reported bins.
+fn profile_bins(edges: &[f64]) -> usize {
+    let halves = 2 * edges.len().saturating_sub(1).max(1);
+    PROFILE_BINS.div_ceil(halves) * halves
+}
+
 /// With forty size bins or more the steps of a smooth estimate are not visible.
 const SIZE_BINS: usize = 40;
 
@@ -37,7 +45,7 @@ impl UnfoldingBins {
             };
         }
         Self {
-            profile_edges: divided_edges(edges, PROFILE_BINS, threshold),
+            profile_edges: divided_edges(edges, profile_bins(edges), threshold),
             size_edges: match sizes {
                 Sizes::Integrated => divided_edges(edges, SIZE_BINS, threshold),
                 Sizes::UpperEdge => edges.to_vec(),
@@ -60,7 +68,7 @@ impl UnfoldingBins {
             return Self::new(edges, threshold, method, sizes);
         }
         Self {
-            profile_edges: fitting_profile_edges(edges, PROFILE_BINS, smallest, threshold),
+            profile_edges: fitting_profile_edges(edges, profile_bins(edges), smallest, threshold),
             size_edges: fitting_edges(edges, smallest, threshold),
         }
     }

@@ -13,7 +13,7 @@ use ndarray::{Array3, ArrayView3, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::grow::{
-    GrowOptions, Grown, LevelOptions, Planes, Voxels, flood_fill, grow, grow_picture, synthesize_by_levels,
+    GrowOptions, Grown, LevelOptions, Planes, Voxels, flood_fill, grow, grow_image, synthesize_by_levels,
 };
 use stereology::metrics::{Family, seams, sections};
 use stereology::pipeline::{CompareOptions, compare_solid};
@@ -95,7 +95,7 @@ fn pictures(folder: &Path, stone: &Array3<f32>) -> Result<()> {
         let piece = stone.slice_axis(Axis(0), (0..side).into());
         let piece = piece.slice_axis(Axis(1), (0..side).into());
         let window = if side == 50 { 9 } else { 11 };
-        let one = grow_picture(piece, [SIDE; 2], &GrowOptions::default().with_window(window), &go)?;
+        let one = grow_image(piece, [SIDE; 2], &GrowOptions::default().with_window(window), &go)?;
         let levels = LevelOptions::default().with_levels(3).with_window(7);
         let other = synthesize_by_levels(piece, [SIDE; 2], &levels, &go)?;
         row(&[shown(&piece), shown(&one.view()), shown(&other.view())])

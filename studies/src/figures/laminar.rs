@@ -35,7 +35,7 @@ const VIOLET: RGBColor = RGBColor(120, 90, 160);
 /// f = A cos(2π (y + u) / 7 + Σ ± atan2(y − y_k, x − x_k)) + B + grain
 /// u, A, B: sums of waves of random direction, long along x
 /// ```
-pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
+pub fn fringe_image(side: usize, seed: u64) -> Array2<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Sixteen waves of lengths about `along` and `across`, of unit variance together.
     let mut waves = |along: f64, across: f64| -> Vec<[f64; 3]> {
@@ -79,7 +79,7 @@ pub fn fringe_picture(side: usize, seed: u64) -> Array2<f32> {
 
 /// The studied image, raw and band-passed.
 fn inputs() -> Result<[Array2<f32>; 2]> {
-    let raw = fringe_picture(SIDE, 2012);
+    let raw = fringe_image(SIDE, 2012);
     let filtered = band_passed(&raw)?;
     Ok([raw, filtered])
 }
@@ -345,7 +345,7 @@ pub fn draw_parameters(folder: &Path) -> Result<()> {
         } else {
             5
         };
-        by_picture.extend(run(&fringe_picture(side, 2012), &[Case { levels, ..kopf }])?);
+        by_picture.extend(run(&fringe_image(side, 2012), &[Case { levels, ..kopf }])?);
     }
     let times: Vec<f64> = counts.iter().map(|&k| learning(raw, k)).collect::<Result<_>>()?;
     let groups: Vec<(&str, &'static str, Vec<f64>, Vec<Outcome>)> = vec![

@@ -10,9 +10,9 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stereology::anneal::{Grain, PackOptions, lognormal_sizes, pack, populate, scale_to_fraction};
-use stereology::pictures::picture_of_solid;
 use stereology::pipeline::{Extent, ParticleTypes, SynthesisOptions, synthesize};
 use stereology::render::{BlockOptions, Camera, RenderOptions};
+use stereology::renderings::render_solid;
 use stereology::sample;
 use stereology::shape::{Arrangement, PeriodicBox, TriangleMesh};
 use stereology::volume::{Axis, SlicePlane, Solid, turned};
@@ -154,7 +154,7 @@ fn block(solid: &Solid) -> Result<RgbImage> {
     } = BlockOptions::default();
     let picture = picture.with_size(SIDE, SIDE);
     let place = |p: &Point3<f64>| *p;
-    Ok(picture_of_solid(solid, &block, &place, &camera, &picture, &|_| {
+    Ok(render_solid(solid, &block, &place, &camera, &picture, &|_| {
         ControlFlow::Continue(())
     })?)
 }
@@ -167,7 +167,7 @@ fn vase(solid: &Solid) -> Result<RgbImage> {
     };
     let options = RenderOptions::default().with_size(SIDE, SIDE).with_samples(4);
     let mesh = carvings::vase(520.0);
-    Ok(picture_of_solid(solid, &mesh, &turned, &camera, &options, &|_| {
+    Ok(render_solid(solid, &mesh, &turned, &camera, &options, &|_| {
         ControlFlow::Continue(())
     })?)
 }

@@ -10,8 +10,8 @@ use stereology::anneal::{
     Distance, Mode, PackOptions, Packing, RadialDistribution, bond_order, box_for_fraction, equilibrate,
     lognormal_sizes, mix, pack, populate, radial_distribution,
 };
-use stereology::pictures::picture_of_packing;
 use stereology::render::RenderOptions;
+use stereology::renderings::render_packing;
 use stereology::shape::{Arrangement, Body, ClosedMesh, TriangleMesh, UnitBody};
 
 use super::bars::{BLUE, GREEN, RED, table};
@@ -187,7 +187,7 @@ fn picture(packing: &Packing, colours: &[[f32; 3]], path: &Path) -> Result<()> {
         gloss: 0.15,
         ..RenderOptions::default().with_size(420, 380)
     };
-    Ok(picture_of_packing(packing, &|i| colours[i], &options)?.save(path)?)
+    Ok(render_packing(packing, &|i| colours[i], &options)?.save(path)?)
 }
 
 fn lines(path: &Path, curves: &[(&str, RadialDistribution, RGBColor)]) -> Result<()> {

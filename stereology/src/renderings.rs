@@ -22,7 +22,7 @@ use stereology_volume::Solid;
 /// ```
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use std::ops::ControlFlow;
-/// use stereology::pictures::picture_of_solid;
+/// use stereology::renderings::render_solid;
 /// use stereology::render::{Camera, RenderOptions};
 /// use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, TriangleMesh, UnitBody};
 /// use stereology::volume::Solid;
@@ -32,11 +32,11 @@ use stereology_volume::Solid;
 /// let foam = Solid::new(Arrangement::new(vec![ball], vec![bubble], PeriodicBox::new(Vector3::repeat(5.0))?)?, vec![[0.5; 3]], [0.9, 0.8, 0.5], None)?.with_voids(&[0])?;
 /// let block = TriangleMesh::cuboid([5.0; 3]);
 /// let options = RenderOptions::default().with_size(60, 60);
-/// let picture = picture_of_solid(&foam, &block, &|p| *p, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
+/// let picture = render_solid(&foam, &block, &|p| *p, &Camera::default(), &options, &|_| ControlFlow::Continue(()))?;
 /// assert_eq!(picture.dimensions(), (60, 60));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn picture_of_solid(
+pub fn render_solid(
     solid: &Solid,
     mesh: &TriangleMesh,
     place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
@@ -67,7 +67,7 @@ pub fn picture_of_solid(
 /// ```
 /// use nalgebra::{Point3, UnitQuaternion, Vector3};
 /// use stereology::anneal::Packing;
-/// use stereology::pictures::picture_of_packing;
+/// use stereology::renderings::render_packing;
 /// use stereology::render::RenderOptions;
 /// use stereology::shape::{Arrangement, Body, Particle, PeriodicBox, UnitBody};
 ///
@@ -75,11 +75,11 @@ pub fn picture_of_solid(
 /// let at = |x| Particle { shape: 0, size: 1.0, category: 0, position: Point3::new(x, 1.0, 1.0), orientation: UnitQuaternion::identity() };
 /// let packing = Packing::verify(&Arrangement::new([ball], vec![at(0.5), at(2.0)], PeriodicBox::new(Vector3::new(3.0, 2.0, 2.0))?)?)?;
 /// let colours = [[0.8, 0.3, 0.2], [0.2, 0.3, 0.8]];
-/// let picture = picture_of_packing(&packing, &|i| colours[i], &RenderOptions::default().with_size(80, 60))?;
+/// let picture = render_packing(&packing, &|i| colours[i], &RenderOptions::default().with_size(80, 60))?;
 /// assert_eq!(picture.dimensions(), (80, 60));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn picture_of_packing(
+pub fn render_packing(
     packing: &Packing,
     colour: &(dyn Fn(usize) -> [f32; 3] + Sync),
     options: &RenderOptions,

@@ -17,6 +17,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Look at overlay.png; give the colour of the binder with --binder, or import a label map with --labels FILE.",
     ),
     (
+        "area-and-size-disagree",
+        "The sizes of the profiles contradict their areas or bounding boxes: other units, radii, Feret diameters, or areas in the column of sizes.",
+        "Correct the table: `size` is the diameter of the circle with the profile's area, in the unit of all other lengths.",
+    ),
+    (
         "beyond-heeger-bergen",
         "The image has structures (edges, chips, layers, two phases) that the synthesis of sub-bands does not reproduce: slices of the result are distinguishable from it.",
         "Use `stereology exemplar`, which copies pixels; for layers or fibres, --mode oriented with one image per axis.",
@@ -30,6 +35,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "clipped-labels",
         "The largest label is exactly 255 or 65,535: the label map was probably clipped when it was saved.",
         "Save the labels with more bits (u16 or u32) and import them again.",
+    ),
+    (
+        "clustered",
+        "The profiles are clustered: their number varies more than that of independent profiles.",
+        "Nothing: the intervals contain it, unless --resample counts was given; several photographs of other places make them narrower.",
     ),
     (
         "coarse-texture",
@@ -98,7 +108,7 @@ pub const CODES: &[(&str, &str, &str)] = &[
     ),
     (
         "impossible-area",
-        "The profiles cover more than the examined area, or one profile is larger than it.",
+        "The profiles cover more than the examined area, beyond the error of counting, or one profile is larger than it.",
         "Check --area and its unit, and whether the sizes are diameters or areas.",
     ),
     (

@@ -1,13 +1,14 @@
-//! Bootstrap: counts resampled from a fit, or slices resampled with replacement, fitted again in parallel, each from
+//! Bootstrap: counts resampled from a fit, or slices or tiles resampled with replacement, fitted again in parallel, each from
 //! its own stream of random numbers.
 
 use crate::estimate::Interval;
 use crate::options::{Bootstrap, Resampling};
+use crate::profile_counts::ProfileCounts;
 use crate::quantiles::{normal_quantile, student_quantile};
 use crate::unfold_error::UnfoldError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Poisson};
+use rand_distr::{Distribution, Gamma, Poisson};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use stereology_metrics::Progress;
@@ -21,7 +22,7 @@ pub(crate) struct Replicates {
     pub(crate) base_of: Vec<usize>,
     pub(crate) densities: Vec<Vec<f64>>,
     pub(crate) bootstrap: Bootstrap,
-    /// Number of slices, if slices were resampled.
+    /// Number of slices or tiles in a resample, if they were resampled.
     pub(crate) slices: Option<usize>,
 }
 
@@ -46,8 +47,8 @@ impl Replicates {
     /// with q_r the quantity of replicate r, g_r that of the fit it was drawn from, and z the normal quantile. The fits
     /// differ where the counts allow several grids, so σ contains that uncertainty too.
     ///
-    /// For slices σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. The interval is
-    /// widened to contain `value`, the reported estimate, and lies between zero and `most`.
+    /// For S slices or tiles σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. The interval
+    /// is widened to contain `value`, the reported estimate, and lies between zero and `most`.
     pub(crate) fn interval(
         &self,
         value: f64,
@@ -92,23 +93,41 @@ impl Replicates {
 pub(crate) enum Source<'a> {
     /// Poisson counts with these means.
     Expected(&'a [f64]),
-    /// As many slices as there are, with repetition: the counts of each.
-    Slices(&'a [Vec<f64>]),
+    /// Slices or tiles, with repetition.
+    Parts(&'a Parts),
 }
 
 impl Source<'_> {
     fn draw(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
         match self {
             Self::Expected(means) => means.iter().map(|&mean| poisson(mean, rng)).collect(),
-            Self::Slices(slices) => {
-                let mut sum = vec![0.0; slices.first().map_or(0, Vec::len)];
-                for _ in 0..slices.len() {
-                    let slice = &slices[rng.random_range(0..slices.len())];
-                    sum.iter_mut().zip(slice).for_each(|(sum, count)| *sum += count);
-                }
-                sum
-            }
+            Self::Parts(parts) => parts.draw(rng),
         }
+    }
+}
+
+/// Parts of the counts that are drawn as a whole.
+pub(crate) struct Parts {
+    /// Counts of each slice, or of a tile at each place.
+    pub(crate) counts: Vec<Vec<f64>>,
+    /// Number of parts in a resample.
+    pub(crate) number: usize,
+    /// Variance of a factor of mean 1 that all counts of a resample have in common.
+    pub(crate) common_variance: f64,
+}
+
+impl Parts {
+    fn draw(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let mut sum = vec![0.0; self.counts.first().map_or(0, Vec::len)];
+        for _ in 0..self.number {
+            let part = &self.counts[rng.random_range(0..self.counts.len())];
+            sum.iter_mut().zip(part).for_each(|(sum, count)| *sum += count);
+        }
+        if let Ok(law) = Gamma::new(1.0 / self.common_variance, self.common_variance) {
+            let factor = law.sample(rng);
+            sum.iter_mut().for_each(|count| *count *= factor);
+        }
+        sum
     }
 }
 
@@ -146,12 +165,30 @@ pub(crate) fn replicate<'a, R>(
         .collect()
 }
 
-/// How counts are to be drawn.
-pub(crate) fn slices_drawn(bootstrap: &Bootstrap, slices: Option<usize>) -> Result<Option<usize>, UnfoldError> {
-    match (bootstrap.resampling, slices) {
-        (Resampling::Counts, _) => Ok(None),
-        (Resampling::Slices, Some(slices)) if slices >= 2 => Ok(Some(slices)),
-        (Resampling::Slices, slices) => Err(UnfoldError::TooFewSlices(slices.unwrap_or(0))),
+/// The parts that are to be drawn, with the rows from `first_row` on; `None` for counts.
+pub(crate) fn parts(
+    bootstrap: &Bootstrap,
+    counts: &ProfileCounts,
+    first_row: usize,
+) -> Result<Option<Parts>, UnfoldError> {
+    let above = |parts: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let part = |of: &Vec<f64>| of[first_row..].iter().map(|n| n / counts.dispersion()).collect();
+        parts.iter().map(part).collect()
+    };
+    match (bootstrap.resampling, counts.by_slice(), counts.tiles()) {
+        (Resampling::Counts, ..) | (Resampling::Auto, _, None) => Ok(None),
+        (Resampling::Slices, Some(slices), _) if slices.len() >= 2 => Ok(Some(Parts {
+            counts: above(slices),
+            number: slices.len(),
+            common_variance: 0.0,
+        })),
+        (Resampling::Slices, slices, _) => Err(UnfoldError::TooFewSlices(slices.map_or(0, <[_]>::len))),
+        (Resampling::Blocks | Resampling::Auto, _, Some(tiles)) => Ok(Some(Parts {
+            counts: above(&tiles.parts),
+            number: tiles.tiling.tiles(),
+            common_variance: tiles.tiling.common_variance(),
+        })),
+        (Resampling::Blocks, _, None) => Err(UnfoldError::NoPositions),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Goodness of fit: do the refolded counts explain the observed ones?
 
+use crate::expectation_maximisation::maximise;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use stereology_metrics::Finding;
 
@@ -7,6 +9,31 @@ use stereology_metrics::Finding;
 const POOLED: f64 = 5.0;
 /// A finding is reported below this p-value, so that at most one table in a thousand raises it by chance.
 const ALARM: f64 = 1e-3;
+
+/// The p-value of the model: of the fit, or of the distribution of largest likelihood if that is higher.
+///
+/// A fit that is smooth, or has few bins, does not follow every distribution: then its misfit does not contradict the
+/// model. So a low p-value of the fit is compared with that of the best of all distributions on the size bins of `fine`.
+pub(crate) fn p_value_of_model(fine: &DMatrix<f64>, counts: &[f64], expected: &[f64], parameters: f64) -> Option<f64> {
+    let of_fit = p_value(counts, expected, parameters);
+    if of_fit.is_none_or(|p| p >= ALARM) {
+        return of_fit;
+    }
+    let best = maximise(fine, counts, 0.0, CLOSE, STEPS).densities;
+    let refolded = fine * DVector::from_column_slice(&best);
+    // A narrow mode that lies between two bins occupies both of them with one parameter.
+    let is_occupied = |j: usize| best[j] * fine.column(j).sum() > 0.5;
+    let modes = (0..best.len())
+        .filter(|&j| is_occupied(j) && (j == 0 || !is_occupied(j - 1)))
+        .count();
+    let of_best = p_value(counts, refolded.as_slice(), modes as f64);
+    [of_fit, of_best].into_iter().flatten().reduce(f64::max)
+}
+
+/// The likelihood of the best distribution is maximised up to this difference of its logarithm, in at most so many
+/// steps.
+const CLOSE: f64 = 0.5;
+const STEPS: usize = 3_000;
 
 /// The p-value of the counts under the expected ones: Pearson's X² over neighbouring bins pooled to five expected
 /// profiles or more.

@@ -60,6 +60,28 @@ pub enum Resampling {
     /// on the next slice). Needs [`ProfileCounts::from_slices`](crate::ProfileCounts::from_slices), and eight slices or
     /// more to be worth it.
     Slices,
+    /// Tiles of one photograph, with repetition: right where profiles are clustered ([`clustering`](crate::clustering)).
+    /// Needs [`ProfileCounts::from_tiles`](crate::ProfileCounts::from_tiles).
+    Blocks,
+    /// Tiles where the counts have them, otherwise counts.
+    Auto,
+}
+
+impl Resampling {
+    /// The name in commands and files.
+    ///
+    /// ```
+    /// assert_eq!(stereology_unfold::Resampling::Blocks.name(), "blocks");
+    /// ```
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Counts => "counts",
+            Self::Slices => "slices",
+            Self::Blocks => "blocks",
+            Self::Auto => "auto",
+        }
+    }
 }
 
 /// Intervals from counts that are resampled and fitted again, corrected for the bias of the estimate.

@@ -109,10 +109,10 @@ pub fn unfold_types_with_progress(
     }
     let mut parts = Vec::with_capacity(types.len());
     for (index, (counts, kernel)) in types.iter().enumerate() {
-        // Streams of different types are far apart: more replicates than 2^32 are never drawn. Slices are the same for
-        // all types.
-        let slices = options.bootstrap.is_some_and(|of| of.resampling == Resampling::Slices);
-        let stream = if slices { 0 } else { (index as u64) << 32 };
+        // Streams of different types are far apart: more replicates than 2^32 are never drawn. Slices and tiles are the
+        // same for all types.
+        let has_parts = options.bootstrap.is_some_and(|of| of.resampling != Resampling::Counts);
+        let stream = if has_parts { 0 } else { (index as u64) << 32 };
         let share = |done: f64| progress((index as f64 + done) / types.len() as f64);
         parts.push(unfold_replicated(counts, kernel, options, stream, &share)?);
     }

@@ -1,5 +1,6 @@
 //! Profiles counted by size on an examined area.
 
+use crate::tiling::Tiling;
 use stereology_metrics::{EdgesError, check_edges};
 
 /// Slices with numbers above this are renumbered.
@@ -31,6 +32,15 @@ pub struct ProfileCounts {
     areas: Vec<f64>,
     /// Counts of each slice.
     slices: Option<Vec<Vec<f64>>>,
+    tiles: Option<Tiles>,
+}
+
+/// Counts of the tiles of a photograph.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tiles {
+    pub(crate) tiling: Tiling,
+    /// Counts of a tile at each of its places.
+    pub(crate) parts: Vec<Vec<f64>>,
 }
 
 /// Why profiles cannot be counted.
@@ -66,6 +76,14 @@ pub enum ProfilesError {
     WeightCount {
         /// Number of weights.
         weights: usize,
+        /// Number of sizes.
+        sizes: usize,
+    },
+    /// Points and sizes differ in number.
+    #[error("{points} positions for {sizes} sizes: give the position of every profile")]
+    PointCount {
+        /// Number of points.
+        points: usize,
         /// Number of sizes.
         sizes: usize,
     },
@@ -179,6 +197,7 @@ impl ProfileCounts {
             dispersion: squares / total,
             areas,
             slices: None,
+            tiles: None,
         })
     }
 
@@ -236,6 +255,52 @@ impl ProfileCounts {
         Ok(whole)
     }
 
+    /// [`from_sizes`](Self::from_sizes) with the position of each profile, so that tiles of the photograph can be
+    /// resampled ([`Resampling::Blocks`](crate::Resampling)).
+    ///
+    /// Parts of the profiles of a photograph share the tiling of the whole.
+    ///
+    /// # Errors
+    ///
+    /// As [`from_sizes`](Self::from_sizes), and [`ProfilesError::PointCount`].
+    ///
+    /// ```
+    /// use stereology_unfold::{ProfileCounts, Tiling};
+    /// let points = [[1.0, 2.0], [7.0, 4.0], [3.0, 9.0]];
+    /// let tiling = Tiling::new(&points, None, 2.0).ok_or("no area")?;
+    /// let counts = ProfileCounts::from_tiles(&[0.2, 0.9, 0.4], None, &points, &tiling, &[0.0, 0.5, 1.0], 100.0)?;
+    /// assert_eq!(counts.counts(), [2.0, 1.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_tiles(
+        sizes: &[f64],
+        weights: Option<&[f64]>,
+        points: &[[f64; 2]],
+        tiling: &Tiling,
+        edges: &[f64],
+        area: f64,
+    ) -> Result<Self, ProfilesError> {
+        let mut whole = Self::from_sizes(sizes, weights, edges, area)?;
+        if points.len() != sizes.len() {
+            return Err(ProfilesError::PointCount {
+                points: points.len(),
+                sizes: sizes.len(),
+            });
+        }
+        let mut cells = vec![vec![0.0; edges.len() - 1]; tiling.cells()];
+        for (index, (&size, point)) in sizes.iter().zip(points).enumerate() {
+            let below = edges.partition_point(|&edge| edge < size);
+            if below > 0 {
+                cells[tiling.cell(point)][below - 1] += weights.map_or(1.0, |weights| weights[index]);
+            }
+        }
+        whole.tiles = Some(Tiles {
+            tiling: *tiling,
+            parts: tiling.parts(&cells),
+        });
+        Ok(whole)
+    }
+
     /// Known counts of each bin, whole numbers or expectations.
     ///
     /// # Errors
@@ -270,6 +335,7 @@ impl ProfileCounts {
                 .map(|(bin, count)| count * mean_profile_area(bin))
                 .collect(),
             slices: None,
+            tiles: None,
         })
     }
 
@@ -323,6 +389,10 @@ impl ProfileCounts {
             by_slice.resize(slices, vec![0.0; bins]);
         }
         self
+    }
+
+    pub(crate) fn tiles(&self) -> Option<&Tiles> {
+        self.tiles.as_ref()
     }
 
     /// Counts of each slice.

@@ -55,6 +55,11 @@ pub enum UnfoldError {
     /// Slices to draw again that are not there.
     #[error("resampling slices needs two or more, there are {0}: give the slice of every profile, or resample counts")]
     TooFewSlices(usize),
+    /// Tiles of a photograph whose profiles have no positions.
+    #[error(
+        "resampling blocks needs the position of every profile on one photograph: give the positions, or resample counts"
+    )]
+    NoPositions,
     /// Several types on different bins, or no type.
     #[error(
         "the bins of type {index} differ from those of the first, or there is no type: several types need common edges"

@@ -1,10 +1,10 @@
 //! From profiles per area to particles per volume: the result, its intervals and its checks.
 
-use crate::bootstrap::{Deviation, Replicates, Source, replicate, slices_drawn};
+use crate::bootstrap::{Deviation, Parts, Replicates, Source, parts, replicate};
 use crate::estimate::{CrossCheck, Estimate, Interval};
 use crate::estimator::{Fit, again, estimate, workspace};
 use crate::findings::findings;
-use crate::goodness::{missing_fines, p_value, poor_fit};
+use crate::goodness::{missing_fines, p_value_of_model, poor_fit};
 use crate::kernel::{Kernel, condition_number};
 use crate::options::{Bootstrap, Method, UnfoldOptions};
 use crate::problem::Problem;
@@ -65,7 +65,8 @@ pub struct Unfolding {
     /// Profile bins less parameters in effect, not below zero.
     pub degrees_of_freedom: usize,
     /// Goodness of fit: the probability of counts as far from the refolded ones as these, or farther, if the model is
-    /// right (Pearson's χ² over bins pooled to five expected profiles). `None` without a degree of freedom.
+    /// right (Pearson's χ² over bins pooled to five expected profiles). Where it is below 0.001 and the distribution of
+    /// largest likelihood on the bins of the kernel has a higher one, that one. `None` without a degree of freedom.
     pub p_value: Option<f64>,
     /// Condition number of the kernel of the reported bins.
     pub condition_number: f64,
@@ -183,9 +184,16 @@ pub(crate) fn unfold_replicated(
     let replicates = match &options.bootstrap {
         None => None,
         Some(bootstrap) => {
-            let slices = slices_drawn(bootstrap, counts.slices())?;
+            let parts = parts(bootstrap, counts, problem.first_row)?;
             Some(resampled(
-                &problem, counts, options, bootstrap, &fit, slices, stream, progress, bins,
+                &problem,
+                options,
+                bootstrap,
+                &fit,
+                parts.as_ref(),
+                stream,
+                progress,
+                bins,
             )?)
         }
     };
@@ -197,11 +205,10 @@ pub(crate) fn unfold_replicated(
 #[allow(clippy::too_many_arguments, reason = "one call")]
 fn resampled(
     problem: &Problem,
-    counts: &ProfileCounts,
     options: &UnfoldOptions,
     bootstrap: &Bootstrap,
     fit: &Fit,
-    slices: Option<usize>,
+    parts: Option<&Parts>,
     stream: u64,
     progress: Progress<'_>,
     bins: usize,
@@ -213,18 +220,6 @@ fn resampled(
         .map(|(_, refit)| again(problem, &problem.counts, refit, options, &mut room))
         .collect::<Result<Vec<_>, _>>()?;
     let expected: Vec<Vec<f64>> = bases.iter().map(|base| problem.refold(base)).collect();
-    let by_slice: Vec<Vec<f64>> = match (slices, counts.by_slice()) {
-        (Some(_), Some(by_slice)) => {
-            let above = |slice: &Vec<f64>| {
-                slice[problem.first_row..]
-                    .iter()
-                    .map(|n| n / counts.dispersion())
-                    .collect()
-            };
-            by_slice.iter().map(above).collect()
-        }
-        _ => Vec::new(),
-    };
     let whole: f64 = fit.again.iter().map(|(weight, _)| weight).sum();
     // Replicate k belongs to the fit in which the cumulative weight passes (k + 1/2) / B.
     let base_of: Vec<usize> = (0..bootstrap.replicates)
@@ -241,13 +236,7 @@ fn resampled(
     let densities = replicate(
         bootstrap,
         stream,
-        |task| {
-            if slices.is_some() {
-                Source::Slices(&by_slice)
-            } else {
-                Source::Expected(&expected[base_of[task]])
-            }
-        },
+        |task| parts.map_or(Source::Expected(&expected[base_of[task]]), Source::Parts),
         problem.columns.len(),
         progress,
         || workspace(problem),
@@ -258,7 +247,7 @@ fn resampled(
         base_of,
         densities: densities.iter().map(|one| problem.widen(one, bins)).collect(),
         bootstrap: *bootstrap,
-        slices,
+        slices: parts.map(|parts| parts.number),
     })
 }
 
@@ -324,7 +313,7 @@ fn result(
     let volume_fraction = quantities.estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
     let rows = problem.counts.len();
     let expected = problem.refold(&fit.densities);
-    let p_value = p_value(&problem.counts, &expected, fit.parameters);
+    let p_value = p_value_of_model(&problem.fine, &problem.counts, &expected, fit.parameters);
     let mut findings = findings(problem, counts, kernel, options, fit, &coarse);
     findings.extend(poor_fit(p_value));
     findings.extend(missing_fines(&problem.counts, &expected, |row| {

@@ -17,6 +17,7 @@
 //! | [`particle_table`] | CSV | particles, one per row |
 //! | [`xyz`] | extended XYZ | particles and box, for OVITO |
 //! | [`vtp`] | VTK poly data | particles as points, for ParaView |
+//! | [`size_columns`] | | columns of a table of profiles that contradict each other |
 //! | [`voxel_table`] | CSV | values at single voxels or points |
 
 mod error;
@@ -28,6 +29,7 @@ pub mod packing;
 pub mod particle_table;
 pub mod profiles;
 pub mod residual;
+pub mod size_columns;
 pub mod solid;
 pub mod steps;
 pub mod table_head;

@@ -1,5 +1,5 @@
 //! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`,
-//! `slice`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored. The
+//! `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored. The
 //! table may begin with lines `# key=value` ([`table_head`]).
 
 use crate::files::FileError;
@@ -80,6 +80,8 @@ pub fn head(segmentation: &Segmentation, scale: f64, unit: Option<LengthUnit>, r
 pub struct ProfileRow {
     /// Equivalent circular diameter.
     pub size: f64,
+    /// Area, if the table has sizes and areas.
+    pub area: Option<f64>,
     /// Index of the particle type, if the table has types.
     pub kind: Option<usize>,
     /// Colour category, if the table has categories.
@@ -94,6 +96,8 @@ pub struct ProfileRow {
     pub colour: Option<[f64; 3]>,
     /// Bounding box in a window that begins at (0, 0), if the table has boxes.
     pub bounding_box: Option<BoundingBox>,
+    /// Position on the slice, if the table has the columns x, y, or boxes: then the centre of the box.
+    pub position: Option<[f64; 2]>,
 }
 
 /// Reads a table of profiles; areas are converted to equivalent circular diameters, √(4 A / π).
@@ -159,6 +163,8 @@ enum SizeColumn {
 struct Columns {
     headers: csv::StringRecord,
     size: SizeColumn,
+    /// Areas beside sizes.
+    area: Option<usize>,
     kind: Option<usize>,
     category: Option<usize>,
     weight: Option<usize>,
@@ -166,6 +172,7 @@ struct Columns {
     touches_edge: Option<usize>,
     colour: Option<[usize; 3]>,
     sides: Option<[usize; 4]>,
+    position: Option<[usize; 2]>,
 }
 
 impl Columns {
@@ -190,6 +197,7 @@ impl Columns {
             ));
         };
         Ok(Self {
+            area: matches!(size, SizeColumn::Size(_)).then(|| column("area")).flatten(),
             size,
             kind: column("type"),
             category: column("category"),
@@ -202,6 +210,10 @@ impl Columns {
             },
             sides: match ["left", "top", "right", "bottom"].map(column) {
                 [Some(left), Some(top), Some(right), Some(bottom)] => Some([left, top, right, bottom]),
+                _ => None,
+            },
+            position: match ["x", "y"].map(column) {
+                [Some(x), Some(y)] => Some([x, y]),
                 _ => None,
             },
             headers: headers.clone(),
@@ -240,11 +252,19 @@ impl Columns {
             let value = text(column).parse::<usize>();
             value.map_err(|_| format!("`{}` is not a slice: a whole number from 0", text(column)))
         };
+        let bounding_box = self.sides.map(|sides| bounding_box(sides, number)).transpose()?;
+        // Positions only serve to find clusters: where one is missing there are none.
+        let position = self
+            .position
+            .and_then(|[x, y]| Some([number(x).ok()?, number(y).ok()?]));
+        let centre = |of: BoundingBox| [0.5 * (of.left + of.right), 0.5 * (of.top + of.bottom)];
         Ok(ProfileRow {
             size: match self.size {
                 SizeColumn::Size(column) => positive(column)?,
                 SizeColumn::Area(column) => (4.0 * positive(column)? / std::f64::consts::PI).sqrt(),
             },
+            // A missing area leaves nothing to compare.
+            area: self.area.and_then(|column| positive(column).ok()),
             kind: self
                 .kind
                 .map(|column| index(column, "type").map(usize::from))
@@ -256,7 +276,8 @@ impl Columns {
                 .colour
                 .map(|[r, g, b]| Ok::<_, String>([channel(r)?, channel(g)?, channel(b)?]))
                 .transpose()?,
-            bounding_box: self.sides.map(|sides| bounding_box(sides, number)).transpose()?,
+            bounding_box,
+            position: position.or(bounding_box.map(centre)),
             weight: match self.weight.map(number).transpose()? {
                 None => 1.0,
                 Some(weight) if weight >= 0.0 => weight,

@@ -2,7 +2,8 @@
 
 use crate::pipeline::fitting::{Fitting, Group};
 use crate::pipeline::{
-    Association, DensityError, DensityOptions, LargestSize, MeasuredProfiles, ParticleTypes, Settled, association,
+    Association, Clusters, DensityError, DensityOptions, LargestSize, MeasuredProfiles, ParticleTypes, Settled,
+    association,
 };
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
@@ -30,9 +31,11 @@ pub struct ParticleDensities {
     pub sizes: Sizes,
     /// Edges of the bins in which `all.observed` and `all.refolded` count profiles.
     pub profile_edges: Vec<f64>,
+    /// Clustering of the profiles, and what the intervals resample.
+    pub clusters: Clusters,
     /// What was chosen or estimated before the fit.
     pub settled: Settled,
-    /// Remarks: those of `all` and of each type, then `fewer-bins`, `largest-uncorrected` and `merged-category`.
+    /// Remarks: those of `all` and of each type, then `clustered`, `fewer-bins`, `largest-uncorrected` and `merged-category`.
     pub findings: Vec<Finding>,
 }
 
@@ -148,6 +151,7 @@ pub fn unfold_profiles(
         }
     }
     let mut findings = findings(profiles, &all, &by_type, counted.len(), &fitting.settled, options);
+    findings.extend(fitting.clusters.finding());
     findings.extend(merged_categories(profiles, &by_colour, &observed, all.threshold));
     Ok(ParticleDensities {
         findings,
@@ -158,6 +162,7 @@ pub fn unfold_profiles(
         types: fitting.types.into_owned(),
         sizes: options.sizes,
         profile_edges: all.profile_edges.clone(),
+        clusters: fitting.clusters,
         settled: fitting.settled,
         all,
     })
@@ -289,6 +294,9 @@ fn merged_categories(
         .collect()
 }
 
+/// Fewer profiles than this do not determine a distribution of sizes.
+const FEW: usize = 10;
+
 fn findings(
     profiles: &MeasuredProfiles,
     all: &Unfolding,
@@ -306,6 +314,12 @@ fn findings(
     for (kind, part) in by_type.iter().enumerate() {
         let of_type = |finding: &Finding| Finding::new(finding.code, format!("type {kind}: {}", finding.message));
         findings.extend(part.findings.iter().map(of_type));
+    }
+    if counted < FEW {
+        findings.push(Finding::new(
+            "few-profiles",
+            format!("{counted} profiles: the densities are hardly more than a guess; examine a larger area"),
+        ));
     }
     if let Some(requested) = settled.reduced_from {
         findings.push(Finding::new(

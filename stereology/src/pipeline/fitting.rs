@@ -5,14 +5,14 @@ use std::borrow::Cow;
 
 use crate::pipeline::section_model::reported;
 use crate::pipeline::{
-    DensityError, DensityOptions, LargestParticle, MeasuredProfiles, ParticleTypes, Spacing, TypeFractions,
+    Clusters, DensityError, DensityOptions, LargestParticle, MeasuredProfiles, ParticleTypes, Spacing, TypeFractions,
     UnfoldingBins, capping_angle, largest_particle, size_edges, type_fractions,
 };
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
 use stereology_unfold::{
-    CategoryModel, CategoryUnfolding, Fractions, Kernel, LikelyParameter, Method, ProfileCounts, UnfoldOptions,
-    divided_edges, equal_edges, unfold, unfold_categories, with_cure,
+    Bootstrap, CategoryModel, CategoryUnfolding, Fractions, Kernel, LikelyParameter, Method, ProfileCounts,
+    UnfoldOptions, divided_edges, equal_edges, unfold, unfold_categories, with_cure,
 };
 
 /// Counted profiles of a category.
@@ -33,6 +33,7 @@ pub(crate) struct Fitting<'a> {
     bins: UnfoldingBins,
     /// The estimator, with the threshold of the fit.
     pub(crate) unfold: UnfoldOptions,
+    pub(crate) clusters: Clusters,
     /// What was chosen or estimated before the fit.
     pub(crate) settled: Settled,
 }
@@ -56,7 +57,8 @@ impl<'a> Fitting<'a> {
         types: &'a ParticleTypes,
         options: &DensityOptions,
     ) -> Result<Self, DensityError> {
-        let counted = profiles.counted()?.len();
+        let places = profiles.counted()?;
+        let counted = places.len();
         let mut settled = Settled::default();
         let limit = options.unfold.min_size.unwrap_or(profiles.min_size);
         let edges = if let Some(edges) = &options.edges {
@@ -85,6 +87,7 @@ impl<'a> Fitting<'a> {
             types = Cow::Owned(types.into_owned().with_shares(&found.fractions)?);
             settled.fractions = Some(found);
         }
+        let clusters = Clusters::of(profiles, &places, options.unfold.bootstrap.as_ref());
         Ok(Self {
             bins: types.unfolding_bins(&edges, profiles.smallest(), threshold, unfold.method, options.sizes),
             profiles,
@@ -93,7 +96,11 @@ impl<'a> Fitting<'a> {
             edges,
             threshold,
             angle,
-            unfold,
+            unfold: clusters.resampling.map_or(unfold, |resampling| UnfoldOptions {
+                bootstrap: unfold.bootstrap.map(|of| Bootstrap { resampling, ..of }),
+                ..unfold
+            }),
+            clusters,
             settled,
         })
     }
@@ -153,6 +160,18 @@ impl<'a> Fitting<'a> {
         let of = self.profiles;
         let sizes: Vec<f64> = places.iter().map(|&i| of.sizes[i]).collect();
         let weights: Vec<f64> = places.iter().map(|&i| of.weights[i]).collect();
+        if let Some(tiling) = &self.clusters.tiling {
+            let points: Vec<[f64; 2]> = places.iter().map(|&i| of.positions[i]).collect();
+            let edges = &bins.profile_edges;
+            return Ok(ProfileCounts::from_tiles(
+                &sizes,
+                Some(&weights),
+                &points,
+                tiling,
+                edges,
+                of.area,
+            )?);
+        }
         if of.slices.is_empty() {
             return Ok(ProfileCounts::from_sizes(
                 &sizes,

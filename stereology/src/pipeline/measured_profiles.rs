@@ -16,6 +16,8 @@ pub struct MeasuredProfiles {
     pub colours: Vec<[f64; 3]>,
     /// Index of the slice of each profile, from 0; empty for one slice, or if the slices are not known.
     pub slices: Vec<usize>,
+    /// Position of each profile on its slice; empty if the positions are not known.
+    pub positions: Vec<[f64; 2]>,
     /// Index of the particle type of each profile, from 0; empty if the types are not known.
     pub types: Vec<usize>,
     /// Area examined; length squared.

@@ -4,6 +4,7 @@
 //! [`population`], [`fine_details`], [`verify`], [`residual_spectra`]. [`Verdict`] judges the result.
 
 mod association;
+mod clusters;
 mod colouring;
 mod densities;
 mod density_options;
@@ -30,6 +31,7 @@ mod verdict;
 mod verification;
 
 pub use association::{Association, SIGNIFICANT, association};
+pub use clusters::Clusters;
 pub use colouring::{ColourSample, particle_colours};
 pub use densities::{CategoryPart, ParticleDensities, unfold_profiles};
 pub use density_options::{Capping, DensityOptions, LargestSize, Spacing, TypeFractions};

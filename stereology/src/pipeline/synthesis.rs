@@ -385,6 +385,10 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         categories: profiles.iter().map(|profile| profile.category).collect(),
         colours: segmentation.categories.iter().map(|category| category.colour).collect(),
         slices: Vec::new(),
+        positions: profiles
+            .iter()
+            .map(|profile| [profile.x * pixel, profile.y * pixel])
+            .collect(),
         types: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
         min_size: MeasuredProfiles::limit_below(segmentation.min_size * pixel),

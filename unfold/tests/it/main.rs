@@ -7,6 +7,7 @@
 )]
 
 mod bad_input;
+mod clusters;
 mod experiment;
 mod figure_7;
 mod incomplete;

@@ -59,7 +59,7 @@ pub struct Choices {
     #[arg(long, value_name = "B", value_parser = count)]
     pub bootstrap: Option<usize>,
     /// What the bootstrap resamples
-    #[arg(long, value_enum, default_value_t = Resample::Counts)]
+    #[arg(long, value_enum, default_value_t = Resample::Auto)]
     pub resample: Resample,
     /// Nominal coverage of the confidence intervals
     #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = share)]
@@ -80,10 +80,14 @@ pub enum Spacing {
 /// What a bootstrap resamples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Resample {
+    /// Blocks (or slices, if there are several) if the profiles are clustered, otherwise counts
+    Auto,
     /// Counts: Poisson numbers with the means of the fit
     Counts,
     /// Whole slices (column `slice`), for profiles that are correlated within a slice
     Slices,
+    /// Tiles of the photograph (columns `x`, `y`, or bounding boxes), for clustered profiles
+    Blocks,
 }
 
 /// How the densities are estimated.
@@ -180,8 +184,10 @@ impl Choices {
                     level: self.level,
                     seed,
                     resampling: match self.resample {
+                        Resample::Auto => Resampling::Auto,
                         Resample::Counts => Resampling::Counts,
                         Resample::Slices => Resampling::Slices,
+                        Resample::Blocks => Resampling::Blocks,
                     },
                 }),
                 ..UnfoldOptions::default()

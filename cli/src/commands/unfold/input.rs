@@ -68,9 +68,20 @@ impl Input {
         })
     }
 
-    /// Refuses options that contradict the head of the table.
+    /// Refuses options that contradict the head of the table, and a head that contradicts itself.
     pub fn check(&self, given: &Given) -> Result<(), Failure> {
         let head = &self.head;
+        let has_slices = self.rows.iter().any(|row| row.slice.is_some());
+        if let (Some(area), Some([width, height]), false) = (head.area, head.window, has_slices)
+            && area > width * height * (1.0 + SAME)
+        {
+            return Err(Failure::run(format!(
+                "area={} in the head of {} is larger than width x height = {}; correct the table (area is in the squared unit of the sizes)",
+                significant(area),
+                self.path.display(),
+                significant(width * height)
+            )));
+        }
         if let (Some(stated), Some(area)) = (head.area, given.area)
             && differ(stated, area)
         {

@@ -10,13 +10,14 @@ use std::path::PathBuf;
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::files::densities;
 use stereology::files::profiles::ProfileRow;
+use stereology::files::{densities, size_columns};
 use stereology::grid::LengthUnit;
 use stereology::pipeline::{
-    DensityError, DensityOptions, MeasuredProfiles, ParticleDensities, TypeFractions, unfold_profiles,
+    Clusters, DensityError, DensityOptions, Finding, MeasuredProfiles, ParticleDensities, TypeFractions,
+    unfold_profiles,
 };
-use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter};
+use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter, Resampling};
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
@@ -132,6 +133,8 @@ pub struct UnfoldFields {
     types: Option<Vec<TypeFields>>,
     /// Unit of all lengths; null if it is not known, or pixels.
     unit: Option<&'static str>,
+    /// Clustering of the profiles; null without positions or several slices, and for few profiles.
+    clustering: Option<ClusteringFields>,
     /// Densities of each colour category, which sum to those of all particles.
     by_category: Vec<CategoryFields>,
     /// Largest particle size; with --max-size likelihood.
@@ -142,6 +145,28 @@ pub struct UnfoldFields {
     capping_angle: Option<LikelihoodFields>,
     #[serde(flatten)]
     fractions: Option<FractionFields>,
+}
+
+/// How clustered the profiles are.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ClusteringFields {
+    /// Variance of the number of profiles over its mean, if they are clustered; independent profiles have 1.
+    dispersion: f64,
+    /// Probability of such a pattern if profiles are not clustered.
+    p_value: f64,
+    /// What the intervals resample: counts, slices or blocks; null without a bootstrap.
+    resampled: Option<&'static str>,
+}
+
+impl ClusteringFields {
+    fn of(clusters: &Clusters) -> Option<Self> {
+        let of = clusters.clustering?;
+        Some(Self {
+            dispersion: of.dispersion,
+            p_value: of.p_value,
+            resampled: clusters.resampling.map(Resampling::name),
+        })
+    }
 }
 
 /// Densities of a particle type.
@@ -191,6 +216,7 @@ impl Unfold {
         let input = Input::read(&self.profiles)?;
         let unit = input.unit(everywhere)?;
         let stated = input.head.min_size;
+        let contradictions = size_columns::findings(&input.rows);
         let measured = self.measured(input, everywhere.scale)?;
         let types = self.choices.types()?;
         let options = self.options(everywhere, stated);
@@ -202,7 +228,7 @@ impl Unfold {
         if let Some(output) = &self.output {
             densities::write(output, &found, unit).at(output)?;
         }
-        self.answer(&found, unit)
+        self.answer(&found, contradictions, unit)
     }
 
     /// The table, in the unit of the run.
@@ -228,6 +254,11 @@ impl Unfold {
             categories: profiles.iter().map(|profile| profile.category.unwrap_or(0)).collect(),
             colours: category_colours(&profiles),
             slices: column(&profiles, |profile| profile.slice),
+            positions: profiles
+                .iter()
+                .map(|profile| profile.position.map(|at| at.map(|of| of * scale)))
+                .collect::<Option<Vec<_>>>()
+                .unwrap_or_default(),
             types: column(&profiles, |profile| profile.kind),
             area: area * scale * scale,
             min_size: head
@@ -266,11 +297,16 @@ impl Unfold {
         Failure::run(format!("{}: {error}{advice}", self.profiles.display()))
     }
 
-    fn answer(&self, found: &ParticleDensities, unit: Option<LengthUnit>) -> Result<Answer, Failure> {
+    fn answer(
+        &self,
+        found: &ParticleDensities,
+        contradictions: Vec<Finding>,
+        unit: Option<LengthUnit>,
+    ) -> Result<Answer, Failure> {
         let sum = &found.all;
         let (mut notes, settled) = (Notes::default(), &found.settled);
-        for finding in &found.findings {
-            notes.warn(finding.clone());
+        for finding in found.findings.iter().cloned().chain(contradictions) {
+            notes.warn(finding);
         }
         let ranged = |estimate: Estimate, shown: fn(f64) -> String| match estimate.interval {
             Some(Interval { lower, upper }) => {
@@ -329,6 +365,7 @@ impl Unfold {
             all: UnfoldingFields::of(sum, self.choices.kernel_name()),
             types: (!found.by_type.is_empty()).then(|| types.collect()),
             unit: unit.map(LengthUnit::symbol),
+            clustering: ClusteringFields::of(&found.clusters),
             by_category: CategoryFields::of(found),
             max_size: largest.map(|likely| estimated(&mut notes, "max size", likely, 1.0, "")),
             capping_angle: settled

@@ -69,6 +69,14 @@ pub fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A relative error above 0, at most one half.
+pub fn size_error(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= 0.5 => Ok(number),
+        _ => Err("a relative error above 0 and at most 0.5 is needed, such as 0.1".to_owned()),
+    }
+}
+
 /// A count from 1 to a million.
 pub fn count(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {

@@ -262,6 +262,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Look at overlay.png; import a label map with --labels FILE if the particles are not outlined well.",
     ),
     (
+        "unused-option",
+        "An option has no effect beside the others.",
+        "Leave it out, or give the option that the message names.",
+    ),
+    (
         "vague-binder",
         "Binder and particle colours overlap: outlines are approximate, and particles with colours of the binder are missed.",
         "Look at overlay.png; give the colour of the binder with --binder, or correct the labels by hand (--labels-out, --labels).",

@@ -3,8 +3,8 @@
 //! `cargo run --release -p stereology-unfold --example clustered -- [REPEATS]`
 //!
 //! One row per number of profiles, members per cluster and radius of the clusters (in sides of the photograph): the
-//! variance of the number of profiles over its mean, how often p is below 0.1 and 0.01, and the coverage of nominal 90 %
-//! intervals of the total and of the mean size with Poisson counts and with blocks where p is below 0.1.
+//! variance of the number of profiles over its mean, how often p is below 0.1 and 0.01, and the coverage of nominal
+//! 90 % intervals of the total and of the mean size with Poisson counts and with blocks where p is below 0.1.
 #![allow(
     clippy::print_stdout,
     clippy::cast_possible_truncation,

@@ -74,11 +74,7 @@ const ALTERATIONS: [(&str, Alteration, &[&str]); 13] = [
         |sizes, _| rounded(sizes, 0.05),
         &["rounded-sizes", "poor-fit"],
     ),
-    (
-        "pixels",
-        |sizes, _| in_pixels(sizes),
-        &["rounded-sizes", "poor-fit"],
-    ),
+    ("pixels", |sizes, _| in_pixels(sizes), &["rounded-sizes", "poor-fit"]),
     (
         "twice",
         |sizes, area| (repeat(sizes, 1), *area *= 2.0).0,

@@ -1,5 +1,5 @@
-//! Bootstrap: counts resampled from a fit, or slices or tiles resampled with replacement, fitted again in parallel, each from
-//! its own stream of random numbers.
+//! Bootstrap: counts resampled from a fit, or slices or tiles resampled with replacement, fitted again in parallel,
+//! each from its own stream of random numbers.
 
 use crate::estimate::Interval;
 use crate::options::{Bootstrap, Resampling};
@@ -47,8 +47,8 @@ impl Replicates {
     /// with q_r the quantity of replicate r, g_r that of the fit it was drawn from, and z the normal quantile. The fits
     /// differ where the counts allow several grids, so σ contains that uncertainty too.
     ///
-    /// For S slices or tiles σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. The interval
-    /// is widened to contain `value`, the reported estimate, and lies between zero and `most`.
+    /// For S slices or tiles σ is √(S / (S − 1)) times that, and z Student's with S − 1 degrees of freedom. The
+    /// interval is widened to contain `value`, the reported estimate, and lies between zero and `most`.
     pub(crate) fn interval(
         &self,
         value: f64,

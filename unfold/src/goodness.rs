@@ -13,7 +13,8 @@ const ALARM: f64 = 1e-3;
 /// The p-value of the model: of the fit, or of the distribution of largest likelihood if that is higher.
 ///
 /// A fit that is smooth, or has few bins, does not follow every distribution: then its misfit does not contradict the
-/// model. So a low p-value of the fit is compared with that of the best of all distributions on the size bins of `fine`.
+/// model. So a low p-value of the fit is compared with that of the best of all distributions on the size bins of
+/// `fine`.
 pub(crate) fn p_value_of_model(fine: &DMatrix<f64>, counts: &[f64], expected: &[f64], parameters: f64) -> Option<f64> {
     let of_fit = p_value(counts, expected, parameters);
     if of_fit.is_none_or(|p| p >= ALARM) {

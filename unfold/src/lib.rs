@@ -99,6 +99,7 @@ mod profile_likelihood;
 mod quantiles;
 mod size_bins;
 mod size_distribution;
+mod size_error;
 mod sparse;
 mod tiling;
 mod unfold_error;
@@ -122,6 +123,7 @@ pub use size_bins::{
     ReportedEdgesError, SizeBins, automatic_bins, divided_edges, equal_edges, geometric_edges, phi_edges,
 };
 pub use size_distribution::{Percentiles, SHARES, SizeDistribution};
+pub use size_error::{measured_edges, measured_kernel, true_profile_edges};
 pub use stereology_metrics::{BoundingBox, EdgeRule, EdgeWeights, EdgesError, Finding, Progress, SamplingWindow};
 pub use tiling::Tiling;
 pub use unfold_error::UnfoldError;

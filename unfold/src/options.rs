@@ -60,8 +60,8 @@ pub enum Resampling {
     /// on the next slice). Needs [`ProfileCounts::from_slices`](crate::ProfileCounts::from_slices), and eight slices or
     /// more to be worth it.
     Slices,
-    /// Tiles of one photograph, with repetition: right where profiles are clustered ([`clustering`](crate::clustering)).
-    /// Needs [`ProfileCounts::from_tiles`](crate::ProfileCounts::from_tiles).
+    /// Tiles of one photograph, with repetition: right where profiles are clustered
+    /// ([`clustering`](crate::clustering)). Needs [`ProfileCounts::from_tiles`](crate::ProfileCounts::from_tiles).
     Blocks,
     /// Tiles where the counts have them, otherwise counts.
     Auto,

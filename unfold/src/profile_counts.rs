@@ -339,6 +339,27 @@ impl ProfileCounts {
         })
     }
 
+    /// The same bins and area without any profile: for a category that has none.
+    ///
+    /// ```
+    /// use stereology_unfold::ProfileCounts;
+    /// let counts = ProfileCounts::from_sizes(&[0.2, 0.9], None, &[0.0, 0.5, 1.0], 5.0)?;
+    /// assert_eq!(counts.without_profiles().counts(), [0.0, 0.0]);
+    /// # Ok::<(), stereology_unfold::ProfilesError>(())
+    /// ```
+    #[must_use]
+    pub fn without_profiles(&self) -> Self {
+        let none = vec![0.0; self.counts.len()];
+        Self {
+            counts: none.clone(),
+            areas: none,
+            profiles: 0,
+            slices: None,
+            tiles: None,
+            ..self.clone()
+        }
+    }
+
     /// The edges of the bins, one more than there are bins.
     #[must_use]
     pub fn edges(&self) -> &[f64] {

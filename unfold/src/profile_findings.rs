@@ -14,7 +14,7 @@ const COARSE_STEPS: f64 = 100.0;
 /// `weights`, one per profile, are those of [`ProfileCounts::from_sizes`](crate::ProfileCounts::from_sizes). Sizes that
 /// are not positive and finite are ignored. Codes:
 ///
-/// - `impossible-area`: the profiles cover more than the area by more than three standard errors of their sum, or one of
+/// - `impossible-area`: the profiles cover more than the area by more than 2.5 standard errors of their sum, or one of
 ///   them does.
 /// - `outlier`: the largest profile, or the two or three largest, are more than twice as large as the next one, and too
 ///   large for the tail below (Hill's estimator, p below 0.003).
@@ -54,7 +54,7 @@ pub fn profile_findings(sizes: &[f64], weights: Option<&[f64]>, area: f64) -> Ve
 
 /// Standard errors by which profiles must exceed their area: the area fraction of a sample scatters, most of all where
 /// large profiles count more than once to make up for those at the edges.
-const BEYOND: f64 = 3.0;
+const BEYOND: f64 = 2.5;
 
 fn impossible_area(counted: &[(f64, f64)], area: f64) -> Option<Finding> {
     let of_one = |size: f64| 0.25 * PI * size * size;
@@ -81,8 +81,8 @@ fn impossible_area(counted: &[(f64, f64)], area: f64) -> Option<Finding> {
 const APART: usize = 3;
 /// The number of sizes that determine the tail.
 const TAIL: usize = 60;
-/// A finding is reported below this p-value. Most tails are lighter than the power law that Hill's estimator assumes: of
-/// a thousand samples of lognormal or gamma-distributed sizes less than one is below.
+/// A finding is reported below this p-value. Most tails are lighter than the power law that Hill's estimator assumes:
+/// of a thousand samples of lognormal or gamma-distributed sizes less than one is below.
 const UNLIKELY: f64 = 3e-3;
 
 /// Judges the ratios of the largest sizes to the next ones by the tail below: for sizes in decreasing order, k times

@@ -163,3 +163,67 @@ fn symptoms_of_labelled_types_are_cured() {
         );
     }
 }
+
+/// Codes of the warnings.
+fn codes(found: &serde_json::Value) -> Vec<&str> {
+    let warnings = found["warnings"].as_array().unwrap().iter();
+    warnings.filter_map(|of| of["code"].as_str()).collect()
+}
+
+/// Chords of spheres at even depths.
+fn chord(k: u32) -> f64 {
+    (1.0 - (f64::from(k % 97) / 97.0).powi(2)).sqrt()
+}
+
+/// Profiles in four heaps are clustered, and tiles are resampled; the same profiles evenly spread are not.
+#[test]
+fn clustered_profiles_are_found_by_their_positions() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = path(&folder, "profiles.csv");
+    let run = |heaps: bool| {
+        let mut rows = String::from("size,x,y\n");
+        for k in 0..400_u32 {
+            let (x, y) = (f64::from(k % 20), f64::from(k / 20));
+            let gather = |of: f64| if heaps { 0.2 * of + 60.0 * (of % 2.0) } else { 5.0 * of };
+            writeln!(rows, "{},{},{}", chord(k), gather(x), gather(y)).unwrap();
+        }
+        fs::write(&table, rows).unwrap();
+        answer(&["unfold", &table, "--area", "10000", "--bootstrap", "40"])
+    };
+    let (even, heaps) = (run(false), run(true));
+    assert_eq!(even["clustering"]["resampled"], "counts");
+    assert_eq!(heaps["clustering"]["resampled"], "blocks");
+    assert!(!codes(&even).contains(&"clustered") && codes(&heaps).contains(&"clustered"));
+    assert_eq!(even["total"], heaps["total"]);
+    assert!(heaps["total_upper"].as_f64() > even["total_upper"].as_f64());
+}
+
+/// A category that a type does not have, a threshold above all profiles, and options without an effect.
+#[test]
+fn what_is_missing_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = path(&folder, "profiles.csv");
+    let rows: String = (0..200_u32)
+        .map(|k| format!("{},{},{}\n", chord(k), k % 2, k % 2))
+        .collect();
+    fs::write(&table, format!("size,type,category\n{rows}")).unwrap();
+    let both = [
+        "unfold",
+        &table,
+        "--area",
+        "100",
+        "--shape",
+        "sphere",
+        "--shape",
+        "box:1,1,1",
+    ];
+    let found = answer(&both);
+    assert_eq!(found["by_category"].as_array().unwrap().len(), 4);
+    let (code, _, error) = stereology(&[&both[..], &["--min-size", "2"]].concat());
+    assert!(
+        code == 1 && error.contains("the threshold 2 leaves no profiles"),
+        "{error}"
+    );
+    let found = answer(&[&both[..], &["--level", "0.8"]].concat());
+    assert!(codes(&found).contains(&"unused-option"));
+}

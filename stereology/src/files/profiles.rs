@@ -1,6 +1,6 @@
 //! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`,
-//! `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are ignored. The
-//! table may begin with lines `# key=value` ([`table_head`]).
+//! `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are
+//! ignored. The table may begin with lines `# key=value` ([`table_head`]).
 
 use crate::files::FileError;
 use crate::files::table_head::{self, TableHead, TableUnit};

@@ -16,8 +16,8 @@ const FILLED: (f64, f64) = (0.25, 1.02);
 /// Findings on rows of a table: `area-and-size-disagree`, `duplicate-rows`.
 ///
 /// - The columns `area` and `size` disagree if the median of `area` / (π/4 `size`²) differs from 1 by more than 2 %.
-/// - `size` and the bounding boxes disagree if the circles of the sizes fill less than a quarter of their boxes, or more
-///   than all of them, in the median.
+/// - `size` and the bounding boxes disagree if the circles of the sizes fill less than a quarter of their boxes, or
+///   more than all of them, in the median.
 /// - Rows are repeated if two have the same slice, position and size.
 ///
 /// ```

@@ -8,7 +8,8 @@ use crate::pipeline::{
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
 use stereology_unfold::{
-    CategoryDensity, CategoryModel, TypesUnfolding, Unfolding, profile_findings, unfold_types_with_progress,
+    CategoryDensity, CategoryModel, TypesUnfolding, UnfoldError, Unfolding, profile_findings,
+    unfold_types_with_progress,
 };
 
 /// Particles per volume: all together, by particle type, by colour category; and what was chosen on the way.
@@ -35,7 +36,8 @@ pub struct ParticleDensities {
     pub clusters: Clusters,
     /// What was chosen or estimated before the fit.
     pub settled: Settled,
-    /// Remarks: those of `all` and of each type, then `clustered`, `fewer-bins`, `largest-uncorrected` and `merged-category`.
+    /// Remarks: those of `all` and of each type, then `few-profiles`, `fewer-bins`, `largest-uncorrected`, `clustered`
+    /// and `merged-category`.
     pub findings: Vec<Finding>,
 }
 
@@ -129,6 +131,10 @@ pub fn unfold_profiles(
             places: places.clone(),
         })
         .collect();
+    if observed.is_empty() {
+        let threshold = fitting.unfold.min_size.unwrap_or(0.0);
+        return Err(UnfoldError::Threshold(threshold).into());
+    }
     let model = if association.together {
         CategoryModel::BySize
     } else {

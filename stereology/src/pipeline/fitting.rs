@@ -89,7 +89,9 @@ impl<'a> Fitting<'a> {
         }
         let clusters = Clusters::of(profiles, &places, options.unfold.bootstrap.as_ref());
         Ok(Self {
-            bins: types.unfolding_bins(&edges, profiles.smallest(), threshold, unfold.method, options.sizes),
+            bins: types
+                .unfolding_bins(&edges, profiles.smallest(), threshold, unfold.method, options.sizes)
+                .with_size_error(profiles.size_error, profiles.smallest(), threshold),
             profiles,
             types,
             sizes: options.sizes,
@@ -128,8 +130,7 @@ impl<'a> Fitting<'a> {
             .map(|group| {
                 let places = of.map_or_else(|| group.places.clone(), |kind| self.of_type(&group.places, kind));
                 if places.is_empty() {
-                    let none = vec![0.0; counts.counts().len()];
-                    return Ok(ProfileCounts::from_counts(&none, counts.edges(), self.profiles.area)?);
+                    return Ok(counts.without_profiles());
                 }
                 self.counts(&places, &self.bins)
             })
@@ -204,6 +205,7 @@ impl<'a> Fitting<'a> {
             self.unfold.method,
             self.sizes,
         );
+        let bins = bins.with_size_error(self.profiles.size_error, self.profiles.smallest(), self.threshold);
         let options = UnfoldOptions {
             bootstrap: None,
             ..self.unfold

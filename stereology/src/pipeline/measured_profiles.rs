@@ -24,6 +24,8 @@ pub struct MeasuredProfiles {
     pub area: f64,
     /// Detection limit: profiles up to this size are not observed.
     pub min_size: f64,
+    /// Relative standard deviation of the errors of the sizes; 0: none.
+    pub size_error: f64,
 }
 
 impl MeasuredProfiles {

@@ -55,6 +55,6 @@ pub use synthesis::{
     Step, Synthesis, SynthesisError, SynthesisOptions, measured_profiles, synthesize, synthesize_from,
 };
 pub use texture_limits::{TextureLimits, image_texture_limits, texture_limits};
-pub use unfolding_bins::UnfoldingBins;
+pub use unfolding_bins::{SizeError, UnfoldingBins};
 pub use verdict::{Check, CheckName, Evidence, Opinion, Verdict};
 pub use verification::{Comparison, Recipe, Verification, VerificationError, verify};

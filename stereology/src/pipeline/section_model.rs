@@ -5,7 +5,7 @@ use crate::pipeline::{Capping, DensityError, LargestSize, MeasuredProfiles, Part
 use stereology_kmatrix::Sizes;
 use stereology_unfold::{
     Fractions, Kernel, LikelyParameter, ProfileCounts, SizeBins, UnfoldError, UnfoldOptions, capped_kernel,
-    equal_edges, largest_size, likely_parameter, unknown_fractions,
+    equal_edges, largest_size, likely_parameter, measured_kernel, unknown_fractions,
 };
 
 /// Nominal coverage of the intervals of parameters of highest likelihood.
@@ -102,11 +102,20 @@ pub fn largest_particle(
             let bins = equal_edges(observed * BEYOND, LIKELIHOOD_BINS);
             let counts = counted.counts(&bins, profiles.area)?;
             let kernel = |size: f64| {
+                let bins = UnfoldingBins {
+                    profile_edges: bins.clone(),
+                    size_edges: equal_edges(size, SIZE_BINS),
+                    error: None,
+                };
+                let mut bins = bins.with_size_error(profiles.size_error, profiles.smallest(), 0.0);
+                bins.profile_edges.truncate(LIKELIHOOD_BINS + 1);
                 types
-                    .kernel(&bins, &equal_edges(size, SIZE_BINS), Sizes::Integrated)
+                    .capped_kernel(0.0, &bins, Sizes::Integrated)
                     .map_err(|_| stereology_unfold::KernelError::Volume(size))
             };
-            let range = (observed, observed * BEYOND);
+            // An error of the sizes makes the largest profile too large.
+            let smallest = observed * (1.0 - 3.0 * profiles.size_error).max(0.3);
+            let range = (smallest, observed * BEYOND);
             let likely = likely_parameter(&counts, &kernel, range, LEVEL, options)?;
             Ok(LargestParticle {
                 size: likely.value,
@@ -137,6 +146,22 @@ impl ParticleTypes {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn capped_kernel(&self, angle: f64, bins: &UnfoldingBins, sizes: Sizes) -> Result<Kernel, DensityError> {
+        let Some(error) = &bins.error else {
+            return self.exact_kernel(angle, bins, sizes);
+        };
+        let exact = UnfoldingBins {
+            profile_edges: error.true_edges.clone(),
+            size_edges: bins.size_edges.clone(),
+            error: None,
+        };
+        let exact = self.exact_kernel(angle, &exact, sizes)?;
+        let edges = &bins.profile_edges;
+        let measured = measured_kernel(&exact, &error.true_edges, edges, error.relative, error.threshold);
+        Ok(measured.map_err(stereology_unfold::UnfoldError::from)?)
+    }
+
+    /// The kernel of exact sizes.
+    fn exact_kernel(&self, angle: f64, bins: &UnfoldingBins, sizes: Sizes) -> Result<Kernel, DensityError> {
         if angle <= 0.0 {
             return Ok(self.kernel(&bins.profile_edges, &bins.size_edges, sizes)?);
         }
@@ -203,6 +228,8 @@ pub fn capping_angle(
                 options.method,
                 Sizes::Integrated,
             );
+            let threshold = options.min_size.unwrap_or(0.0);
+            let bins = bins.with_size_error(profiles.size_error, profiles.smallest(), threshold);
             let counts = Counted::of(profiles)?.counts(&bins.profile_edges, profiles.area)?;
             let kernel = |angle: f64| {
                 types
@@ -252,15 +279,13 @@ pub fn type_fractions(
         options.method,
         Sizes::Integrated,
     );
+    let threshold = options.min_size.unwrap_or(0.0);
+    let bins = bins.with_size_error(profiles.size_error, profiles.smallest(), threshold);
     let counts = Counted::of(profiles)?.counts(&bins.profile_edges, profiles.area)?;
-    let kernels = types
-        .types()
-        .iter()
-        .map(|of| {
-            reported(
-                of.kernel(&bins.profile_edges, &bins.size_edges, Sizes::Integrated)?,
-                edges,
-            )
+    let kernels = (0..types.types().len())
+        .map(|index| {
+            let kernel = types.only(index).capped_kernel(0.0, &bins, Sizes::Integrated)?;
+            reported(kernel, edges)
         })
         .collect::<Result<Vec<_>, DensityError>>()?;
     Ok(unknown_fractions(&counts, &kernels, LEVEL, options)?)

@@ -392,5 +392,6 @@ pub fn measured_profiles(segmentation: &Segmentation, pixel: f64) -> MeasuredPro
         types: Vec::new(),
         area: segmentation.window.area * pixel * pixel,
         min_size: MeasuredProfiles::limit_below(segmentation.min_size * pixel),
+        size_error: 0.0,
     }
 }

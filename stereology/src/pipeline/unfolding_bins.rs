@@ -2,7 +2,9 @@
 
 use crate::pipeline::ParticleTypes;
 use stereology_kmatrix::Sizes;
-use stereology_unfold::{Method, divided_edges, fitting_edges, fitting_profile_edges};
+use stereology_unfold::{
+    Method, divided_edges, fitting_edges, fitting_profile_edges, measured_edges, true_profile_edges,
+};
 
 /// The bins of a fit: profile bins fine enough to lose little information, size bins fine enough for a smooth density,
 /// both with an edge at the threshold. The paper's inverse needs a square kernel, so its bins are the reported ones; so
@@ -13,6 +15,19 @@ pub struct UnfoldingBins {
     pub profile_edges: Vec<f64>,
     /// Edges of the size bins of the kernel; those of the reported bins are among them.
     pub size_edges: Vec<f64>,
+    /// Errors of the measured sizes, if there are any.
+    pub error: Option<SizeError>,
+}
+
+/// Errors of measured sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SizeError {
+    /// Relative standard deviation.
+    pub relative: f64,
+    /// Edges of bins of true profile sizes.
+    pub true_edges: Vec<f64>,
+    /// Particles up to this size are not estimated.
+    pub threshold: f64,
 }
 
 /// With a hundred profile bins or more the loss of information does not show in the densities.
@@ -42,6 +57,7 @@ impl UnfoldingBins {
             return Self {
                 profile_edges: edges.to_vec(),
                 size_edges: edges.to_vec(),
+                error: None,
             };
         }
         Self {
@@ -50,6 +66,7 @@ impl UnfoldingBins {
                 Sizes::Integrated => divided_edges(edges, SIZE_BINS, threshold),
                 Sizes::UpperEdge => edges.to_vec(),
             },
+            error: None,
         }
     }
 
@@ -70,9 +87,37 @@ impl UnfoldingBins {
         Self {
             profile_edges: fitting_profile_edges(edges, profile_bins(edges), smallest, threshold),
             size_edges: fitting_edges(edges, smallest, threshold),
+            error: None,
         }
     }
+
+    /// These bins for sizes that were measured with an error of this relative standard deviation, the smallest with
+    /// size `smallest`; 0: none.
+    ///
+    /// ```
+    /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
+    /// let bins = UnfoldingBins::new(&[0.0, 0.5, 1.0], 0.0, Method::Auto, Sizes::Integrated).with_size_error(0.1, 0.01, 0.0);
+    /// assert!(bins.profile_edges.last() > Some(&1.4));
+    /// ```
+    #[must_use]
+    pub fn with_size_error(mut self, relative: f64, smallest: f64, threshold: f64) -> Self {
+        if relative > 0.0 {
+            let largest = self.size_edges.last().copied().unwrap_or(0.0);
+            // A profile may be smaller than the smallest that was measured.
+            let from = (0.5 * smallest).clamp(largest * SMALLEST, 0.5 * largest);
+            self.profile_edges = measured_edges(&self.profile_edges, relative);
+            self.error = Some(SizeError {
+                relative,
+                true_edges: true_profile_edges(from, largest, relative),
+                threshold,
+            });
+        }
+        self
+    }
 }
+
+/// True profile sizes are divided down to this fraction of the largest size.
+const SMALLEST: f64 = 1e-4;
 
 /// The highest profile bin is widened until it holds this fraction of the profiles of the largest particles. Planes
 /// rarely give the largest section of a body (of a mesh, possibly none of the planes tried), so a profile there could

@@ -11,4 +11,5 @@ mod comparisons;
 mod files;
 mod finishing;
 mod sample;
+mod size_error;
 mod spheres;

@@ -58,12 +58,12 @@ pub struct Choices {
     /// Number of bootstrap replicates for confidence intervals [default: none; synthesize: 200]
     #[arg(long, value_name = "B", value_parser = count)]
     pub bootstrap: Option<usize>,
-    /// What the bootstrap resamples
-    #[arg(long, value_enum, default_value_t = Resample::Auto)]
-    pub resample: Resample,
-    /// Nominal coverage of the confidence intervals
-    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = share)]
-    pub level: f64,
+    /// What the bootstrap resamples [default: auto]
+    #[arg(long, value_enum)]
+    pub resample: Option<Resample>,
+    /// Nominal coverage of the confidence intervals [default: 0.9]
+    #[arg(long, value_name = "P", value_parser = share)]
+    pub level: Option<f64>,
 }
 
 /// How bins are spaced.
@@ -181,9 +181,9 @@ impl Choices {
                 min_size: self.min_size.map(|size| size * scale),
                 bootstrap: self.bootstrap.or(defaults.replicates).map(|replicates| Bootstrap {
                     replicates,
-                    level: self.level,
+                    level: self.level.unwrap_or(0.9),
                     seed,
-                    resampling: match self.resample {
+                    resampling: match self.resample.unwrap_or(Resample::Auto) {
                         Resample::Auto => Resampling::Auto,
                         Resample::Counts => Resampling::Counts,
                         Resample::Slices => Resampling::Slices,

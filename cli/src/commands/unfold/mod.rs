@@ -24,7 +24,7 @@ use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::check_file;
 use crate::progress::{Step, go_on};
-use crate::values::{Window, count, positive};
+use crate::values::{Window, count, positive, size_error};
 use stereology_report::{percent, significant};
 
 pub use choices::{Choices, Defaults, types};
@@ -90,6 +90,10 @@ pub struct Unfold {
     /// Width and height of a slice, for --edge-rule [default: those of the table]
     #[arg(long, value_name = "WIDTH,HEIGHT", help_heading = "Unfolding")]
     pub window: Option<Window>,
+    /// Relative standard deviation of the errors of the measured sizes, for example 0.1: measured sizes scatter about
+    /// the true ones, which would otherwise be interpreted as more large and small particles
+    #[arg(long, value_name = "R", value_parser = size_error, help_heading = "Unfolding")]
+    pub size_error: Option<f64>,
     /// Estimate the fractions of several --shape from the profiles; refused if the profiles do not determine them
     #[arg(long, help_heading = "Unfolding")]
     pub unknown_fractions: bool,
@@ -216,9 +220,15 @@ impl Unfold {
         let input = Input::read(&self.profiles)?;
         let unit = input.unit(everywhere)?;
         let stated = input.head.min_size;
-        let contradictions = size_columns::findings(&input.rows);
+        let mut remarks = size_columns::findings(&input.rows);
+        remarks.extend(self.without_effect());
         let measured = self.measured(input, everywhere.scale)?;
         let types = self.choices.types()?;
+        if self.size_error.is_some() && self.choices.method == choices::Method::Paper {
+            return Err(Failure::usage(
+                "--size-error needs profile bins beyond the largest size, which --method paper cannot use; use --method auto",
+            ));
+        }
         let options = self.options(everywhere, stated);
         let step = Step::begin("unfolding", everywhere.quiet);
         let found = unfold_profiles(&measured, &types, &options, &|done| step.at(done))
@@ -228,7 +238,51 @@ impl Unfold {
         if let Some(output) = &self.output {
             densities::write(output, &found, unit).at(output)?;
         }
-        self.answer(&found, contradictions, unit)
+        self.answer(&found, remarks, unit)
+    }
+
+    /// A warning of options that have no effect beside the others.
+    fn without_effect(&self) -> Option<Finding> {
+        let of = &self.choices;
+        let without_bootstrap = of.bootstrap.is_none();
+        let iterates = matches!(of.method, choices::Method::Em | choices::Method::Ems);
+        let unused = [
+            (
+                "--resample",
+                of.resample.is_some() && without_bootstrap,
+                "without --bootstrap",
+            ),
+            (
+                "--level",
+                of.level.is_some() && without_bootstrap,
+                "without --bootstrap",
+            ),
+            (
+                "--tolerance",
+                self.tolerance.is_some() && of.method != choices::Method::Em,
+                "except with --method em",
+            ),
+            (
+                "--iterations",
+                self.iterations.is_some() && !iterates,
+                "except with --method em or ems",
+            ),
+            (
+                "--window",
+                self.window.is_some() && self.edge_rule.is_none(),
+                "without --edge-rule",
+            ),
+            (
+                "--bins",
+                of.bins.is_some() && of.spacing == choices::Spacing::Phi,
+                "with --spacing phi",
+            ),
+        ];
+        let unused = unused.into_iter().filter(|of| of.1);
+        let texts: Vec<String> = unused
+            .map(|(option, _, why)| format!("{option} has no effect {why}"))
+            .collect();
+        (!texts.is_empty()).then(|| Finding::new("unused-option", texts.join("; ")))
     }
 
     /// The table, in the unit of the run.
@@ -264,6 +318,7 @@ impl Unfold {
             min_size: head
                 .min_size
                 .map_or(0.0, |smallest| MeasuredProfiles::limit_below(smallest * scale)),
+            size_error: self.size_error.unwrap_or(0.0),
         })
     }
 
@@ -300,12 +355,12 @@ impl Unfold {
     fn answer(
         &self,
         found: &ParticleDensities,
-        contradictions: Vec<Finding>,
+        remarks: Vec<Finding>,
         unit: Option<LengthUnit>,
     ) -> Result<Answer, Failure> {
         let sum = &found.all;
         let (mut notes, settled) = (Notes::default(), &found.settled);
-        for finding in found.findings.iter().cloned().chain(contradictions) {
+        for finding in found.findings.iter().cloned().chain(remarks) {
             notes.warn(finding);
         }
         let ranged = |estimate: Estimate, shown: fn(f64) -> String| match estimate.interval {

@@ -117,7 +117,7 @@ pub fn measured_kernel(
 #[cfg(test)]
 mod tests {
     use super::{measured_edges, measured_kernel, true_profile_edges};
-    use crate::{Kernel, SizeBins, capped_kernel, divided_edges, equal_edges};
+    use crate::{Kernel, SizeBins, capped_kernel, equal_edges};
     use proptest::prelude::*;
 
     fn spheres(edges: &[f64]) -> Kernel {
@@ -132,7 +132,7 @@ mod tests {
         fn errors_keep_numbers_and_mean_sizes(relative in 0.02..0.3_f64) {
             let true_edges = true_profile_edges(0.005, 1.0, relative);
             let exact = spheres(&true_edges);
-            let edges = measured_edges(&divided_edges(&equal_edges(1.0, 5), 400, 0.0), relative);
+            let edges = equal_edges(4.0, 1_600);
             let measured = measured_kernel(&exact, &true_edges, &edges, relative, 0.0).unwrap();
             let moment = |kernel: &Kernel, edges: &[f64], j: usize, power: i32| -> f64 {
                 let bins = edges.windows(2).zip(kernel.matrix().column(j).iter().copied().collect::<Vec<_>>());

@@ -39,13 +39,18 @@ impl Clusters {
             clustering_of_slices(&on_slices(profiles, counted, slices))
         };
         let is_used = found.is_some_and(|of| of.p_value < USED);
+        // The dispersion is that of clusters, whether there are any or not.
+        let found = found.map(|of| Clustering {
+            dispersion: if is_used { of.dispersion } else { 1.0 },
+            ..of
+        });
         let resampling = bootstrap.map(|of| match of.resampling {
             Resampling::Auto if is_used && slices >= 2 => Resampling::Slices,
             Resampling::Auto if is_used => Resampling::Blocks,
             Resampling::Auto => Resampling::Counts,
             given => given,
         });
-        let dispersion = found.filter(|_| is_used).map_or(1.0, |of| of.dispersion);
+        let dispersion = found.map_or(1.0, |of| of.dispersion);
         let tiling = (resampling == Some(Resampling::Blocks))
             .then(|| Tiling::new(&points, Some(&weights), dispersion))
             .flatten();

@@ -357,7 +357,7 @@ fn by_law(profiles: &MeasuredProfiles, law: &GrainLaw, options: UnfoldOptions) -
     let threshold = options.min_size.unwrap_or(0.0);
     let spheres = ParticleTypes::parse(&["sphere"])?;
     let smallest = profiles.sizes.iter().copied().fold(largest, f64::min);
-    let bins = spheres.unfolding_bins(&edges, smallest, threshold, options.method, Sizes::Integrated);
+    let bins = spheres.unfolding_bins(&edges, smallest, threshold, largest, options.method, Sizes::Integrated);
     let up_to = |x: f64| law.relative.partition_point(|of| *of <= x) as f64 / law.relative.len() as f64;
     let sizes = SizeBins::integrated(&bins.size_edges)?.reported_in(&edges)?;
     let kernel = capped_kernel(&up_to, law.caliper, 0.0, &bins.profile_edges, sizes, law.unit_volume)?;

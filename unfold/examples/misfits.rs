@@ -191,8 +191,8 @@ fn codes(sizes: &[f64], area: f64) -> Result<Vec<&'static str>, Box<dyn Error>> 
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let smallest = sizes.iter().copied().fold(largest, f64::min);
     let edges = equal_edges(largest, 10);
-    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0))?.reported_in(&edges)?;
-    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0);
+    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0, 0.0))?.reported_in(&edges)?;
+    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0, 0.0);
     let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
     let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?;
     let counts = ProfileCounts::from_sizes(sizes, None, &profile_edges, area)?;

@@ -1,10 +1,12 @@
 //! Bias and coverage of `unfold` for size distributions of known truth: spheres, sections simulated exactly.
 //!
 //! `cargo run --release -p stereology-unfold --example size_laws -- [REPEATS [PROFILES,... [LAW,...|all [METHOD
-//! [REPLICATES]]]]]`
+//! [REPLICATES [SEED [LARGEST]]]]]]]`
 //!
-//! One row per distribution and number of profiles: bias, standard deviation and coverage (nominal 90 %) of the total,
-//! the mean size and the volume fraction, coverage of the bins on average, and milliseconds per fit.
+//! One row per distribution and number of profiles: bias, standard deviation and coverage (nominal 90 %) of the
+//! total, the mean size and the volume fraction, coverage of the bins on average, the mean |error| of the total, the
+//! L1 distance of the histograms normalised by number, and milliseconds per fit. The largest size is that of the
+//! largest profile, or LARGEST. No intervals are computed if REPLICATES is 0.
 #![allow(
     clippy::print_stdout,
     clippy::cast_possible_truncation,
@@ -20,10 +22,10 @@ use std::f64::consts::PI;
 use std::time::Instant;
 use stereology_unfold::{
     Bootstrap, Estimate, Method, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel, equal_edges,
-    fitting_edges, fitting_profile_edges, profile_findings, unfold,
+    fitting_edges, fitting_profile_edges, profile_findings, smallest_size, unfold,
 };
 
-const LAWS: [&str; 16] = [
+const LAWS: [&str; 18] = [
     "lognormal.3",
     "lognormal.5",
     "lognormal.8",
@@ -39,6 +41,8 @@ const LAWS: [&str; 16] = [
     "constant",
     "single",
     "bimodal",
+    "lognormal.45",
+    "two bands",
     "band+mode",
 ];
 
@@ -85,6 +89,8 @@ fn size(law: &str, rng: &mut ChaCha8Rng) -> f64 {
         "constant" => uniform,
         "single" => within(0.55 + 0.15 * normal, rng, law),
         "bimodal" => within(if uniform < 0.5 { 0.3 } else { 0.75 } + 0.08 * normal, rng, law),
+        "lognormal.45" => within(0.3 * (0.45 * normal).exp(), rng, law),
+        "two bands" => 0.1 * (uniform + if rng.random::<f64>() < 0.5 { 3.0 } else { 7.0 }),
         "band+mode" if uniform < 0.3 => 0.7 + 0.05 * rng.random::<f64>(),
         "band+mode" => within(0.5 + 0.15 * normal, rng, law),
         _ => 0.5,
@@ -149,27 +155,44 @@ impl Law {
         (profiles.collect(), expected / self.mean)
     }
 
-    /// Fraction of the particles in a bin.
-    fn fraction(&self, from: f64, to: f64) -> f64 {
+    /// Fractions of the particles in bins; the last holds larger ones too.
+    fn fractions(&self, edges: &[f64]) -> Vec<f64> {
         let below = |size: f64| self.sorted.partition_point(|&of| of <= size) as f64;
-        (below(to) - below(from)) / self.sorted.len() as f64
+        let last = edges.len() - 1;
+        let upper = |k: usize| if k == last { f64::INFINITY } else { edges[k] };
+        (0..last)
+            .map(|k| (below(upper(k + 1)) - below(edges[k])) / self.sorted.len() as f64)
+            .collect()
     }
 }
 
-fn fit(profiles: &[f64], area: f64, seed: u64, method: Method, replicates: usize) -> Result<Unfolding, Box<dyn Error>> {
-    let largest = profiles.iter().copied().fold(0.0, f64::max);
+/// How samples are fitted.
+#[derive(Clone, Copy)]
+struct Fitting {
+    method: Method,
+    replicates: usize,
+    largest: Option<f64>,
+}
+
+fn fit(profiles: &[f64], area: f64, seed: u64, of: Fitting) -> Result<Unfolding, Box<dyn Error>> {
+    let observed = profiles.iter().copied().fold(0.0, f64::max);
+    let largest = of.largest.unwrap_or(observed);
     let edges = equal_edges(largest, 10);
-    let smallest = profiles.iter().copied().fold(largest, f64::min);
-    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0))?.reported_in(&edges)?;
-    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0);
+    let smallest = smallest_size(profiles);
+    let top = of.largest.unwrap_or(1.5 * largest);
+    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0, top))?.reported_in(&edges)?;
+    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0, top);
     let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
-    let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?;
+    let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?.with_profile_law(law);
     let counts = ProfileCounts::from_sizes(profiles, None, &profile_edges, area)?;
-    let options = UnfoldOptions::default().with_method(method).with_bootstrap(Bootstrap {
-        seed,
-        replicates,
-        ..Bootstrap::default()
-    });
+    let mut options = UnfoldOptions::default().with_method(of.method);
+    if of.replicates > 0 {
+        options = options.with_bootstrap(Bootstrap {
+            seed,
+            replicates: of.replicates,
+            ..Bootstrap::default()
+        });
+    }
     Ok(unfold(&counts, &spheres, &options)?)
 }
 
@@ -199,6 +222,10 @@ impl Tally {
             self.covered as f64 / n
         )
     }
+
+    fn mean_absolute(&self) -> f64 {
+        self.errors.iter().map(|error| error.abs()).sum::<f64>() / self.errors.len() as f64
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -213,6 +240,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some(other) => return Err(format!("no method {other}").into()),
     };
     let replicates = arguments.next().map_or(Ok(200), |text| text.parse())?;
+    let seed: u64 = arguments.next().map_or(Ok(11), |text| text.parse())?;
+    let largest = arguments.next().map(|text| text.parse()).transpose()?;
+    let how = Fitting {
+        method,
+        replicates,
+        largest,
+    };
     println!(
         "law           profiles |   total          |   mean size      |   volume frac.   |  A_A   | bins    L1  sparse alarms ms"
     );
@@ -230,11 +264,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (mut bins_held, mut bins, mut sparse, mut seconds) = (0_u32, 0_u32, 0_usize, 0.0);
             let (mut distance, mut area_fraction, mut alarms) = (0.0, 0.0, 0_usize);
             for repeat in 0..repeats {
-                let mut rng = ChaCha8Rng::seed_from_u64(11 + 1000 * repeat);
+                let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * repeat);
                 rng.set_stream(expected as u64);
                 let (sizes, area) = law.profiles(expected, &mut rng);
                 let start = Instant::now();
-                let found = fit(&sizes, area, repeat, method, replicates)?;
+                let found = fit(&sizes, area, repeat, how)?;
                 seconds += start.elapsed().as_secs_f64();
                 total.add(found.total, 1.0);
                 mean.add(found.mean_size, law.mean);
@@ -252,12 +286,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let data = profile_findings(&sizes, None, f64::MAX);
                 alarms += usize::from(found.findings.iter().chain(&data).any(|of| wrong.contains(&of.code)));
                 sparse += usize::from(found.method.name() == "sparse");
-                for (bin, density) in found.edges.windows(2).zip(&found.number_density) {
-                    let truth = law.fraction(bin[0], bin[1]);
+                let truth = law.fractions(&found.edges);
+                for (density, truth) in found.number_density.iter().zip(&truth) {
                     distance += (density.unwrap_or(0.0) / found.total.value - truth).abs();
                 }
-                for (bin, interval) in found.edges.windows(2).zip(found.intervals.iter().flatten()) {
-                    let truth = law.fraction(bin[0], bin[1]);
+                for (interval, &truth) in found.intervals.iter().flatten().zip(&truth) {
                     if let Some(of) = interval
                         && truth > 0.0
                     {
@@ -267,7 +300,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
             println!(
-                "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.3} {sparse:3}/{repeats:3} {alarms:3} {:.1}",
+                "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.4} {:.4} {sparse:3}/{repeats:3} {alarms:3} {:.1}",
                 law.name,
                 expected,
                 total.show(),
@@ -275,6 +308,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 volume.show(),
                 100.0 * area_fraction / repeats as f64,
                 f64::from(bins_held) / f64::from(bins.max(1)),
+                total.mean_absolute(),
                 distance / repeats as f64,
                 1e3 * seconds / repeats as f64
             );

@@ -3,6 +3,7 @@
 
 use crate::estimate::Interval;
 use crate::options::{Bootstrap, Resampling};
+use crate::population::Population;
 use crate::profile_counts::ProfileCounts;
 use crate::quantiles::{normal_quantile, student_quantile};
 use crate::unfold_error::UnfoldError;
@@ -17,10 +18,10 @@ use stereology_metrics::Progress;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Replicates {
     /// Densities of the fits that counts were drawn from.
-    pub(crate) bases: Vec<Vec<f64>>,
+    pub(crate) bases: Vec<Population>,
     /// Index of the base of each replicate.
     pub(crate) base_of: Vec<usize>,
-    pub(crate) densities: Vec<Vec<f64>>,
+    pub(crate) densities: Vec<Population>,
     pub(crate) bootstrap: Bootstrap,
     /// Number of slices or tiles in a resample, if they were resampled.
     pub(crate) slices: Option<usize>,
@@ -33,6 +34,8 @@ pub(crate) enum Deviation {
     Spread,
     /// The root of spread² + bias²: for a single bin, whose bias is not known well.
     SpreadAndBias,
+    /// As [`Spread`](Self::Spread), of the logarithms: for sums whose error is in proportion to them.
+    Ratio,
 }
 
 impl Replicates {
@@ -54,14 +57,37 @@ impl Replicates {
         value: f64,
         most: f64,
         deviation: Deviation,
-        quantity: &dyn Fn(&[f64]) -> f64,
+        quantity: &dyn Fn(&Population) -> f64,
     ) -> Interval {
-        let bases: Vec<f64> = self.bases.iter().map(|base| quantity(base)).collect();
-        let n = self.densities.len() as f64;
+        let bases: Vec<f64> = self.bases.iter().map(quantity).collect();
         let replicates = self.densities.iter().zip(&self.base_of);
         let values: Vec<(f64, f64)> = replicates
             .map(|(densities, &base)| (bases[base], quantity(densities) - bases[base]))
             .collect();
+        if deviation == Deviation::Ratio
+            && value > 0.0
+            && values.iter().all(|(base, error)| *base > 0.0 && base + error > 0.0)
+        {
+            let logarithms: Vec<(f64, f64)> = values
+                .iter()
+                .map(|(base, error)| (base.ln(), ((base + error) / base).ln()))
+                .collect();
+            let within = self.about(&logarithms, Deviation::Spread);
+            return Interval {
+                lower: within.lower.exp().min(value),
+                upper: within.upper.exp().min(most).max(value),
+            };
+        }
+        let within = self.about(&values, deviation);
+        Interval {
+            lower: within.lower.max(0.0).min(value),
+            upper: within.upper.min(most).max(value),
+        }
+    }
+
+    /// The interval of values and errors of the fits.
+    fn about(&self, values: &[(f64, f64)], deviation: Deviation) -> Interval {
+        let n = values.len() as f64;
         let bias = values.iter().map(|(_, error)| error).sum::<f64>() / n;
         let centre = values.iter().map(|(base, error)| base - error).sum::<f64>() / n;
         let variance = values
@@ -83,8 +109,8 @@ impl Replicates {
         };
         let reach = quantile * squared.sqrt();
         Interval {
-            lower: (centre - reach).max(0.0).min(value),
-            upper: (centre + reach).min(most).max(value),
+            lower: centre - reach,
+            upper: centre + reach,
         }
     }
 }
@@ -132,7 +158,7 @@ impl Parts {
 }
 
 /// Draws counts and fits them, `bootstrap.replicates` times. `source` and `fit` receive the number of the replicate;
-/// `fit` also receives working memory.
+/// `fit` also receives working memory and the random numbers of the replicate.
 pub(crate) fn replicate<'a, R>(
     bootstrap: &Bootstrap,
     stream: u64,
@@ -140,8 +166,8 @@ pub(crate) fn replicate<'a, R>(
     bins: usize,
     progress: Progress<'_>,
     room: impl Fn() -> R + Sync + Send,
-    fit: impl Fn(usize, &[f64], &mut R) -> Result<Vec<f64>, UnfoldError> + Sync,
-) -> Result<Vec<Vec<f64>>, UnfoldError> {
+    fit: impl Fn(usize, &[f64], &mut R, &mut ChaCha8Rng) -> Result<Population, UnfoldError> + Sync,
+) -> Result<Vec<Population>, UnfoldError> {
     let done = AtomicUsize::new(0);
     (0..bootstrap.replicates)
         .into_par_iter()
@@ -151,9 +177,9 @@ pub(crate) fn replicate<'a, R>(
             let drawn = source(task).draw(&mut rng);
             // A resample with no profiles has zero density in every bin.
             let densities = if drawn.iter().sum::<f64>() > 0.0 {
-                fit(task, &drawn, room)?
+                fit(task, &drawn, room, &mut rng)?
             } else {
-                vec![0.0; bins]
+                Population::of_bins(vec![0.0; bins])
             };
             let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / bootstrap.replicates as f64;
             if progress(share).is_break() {

@@ -9,10 +9,12 @@ use crate::bootstrap::{Replicates, poisson};
 use crate::estimate::{Estimate, Interval};
 use crate::kernel::Kernel;
 use crate::options::UnfoldOptions;
+use crate::point_kernel::PointKernel;
+use crate::population::{Grouping, Population};
 use crate::profile_counts::ProfileCounts;
 use crate::size_distribution::{Moments, Weighing};
 use crate::unfold_error::UnfoldError;
-use crate::unfolding::{Quantities, Unfolding, sum_of_group, unfold_replicated};
+use crate::unfolding::{Quantities, Unfolding, unfold_replicated};
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -212,15 +214,14 @@ pub fn unfold_categories(
     let labels = Labels::new(counts, labelled, model, kernel, all.threshold);
     let fractions = labels.fractions(&densities, &labels.counts, None);
     let by_replicate = replicates.as_ref().map(|of| labels.replicated(of, &fractions));
-    let groups = kernel.sizes().groups();
+    let grouping = Grouping::new(kernel.sizes());
     let moments = Moments::new(kernel.sizes());
     let categories = (0..labelled.len())
         .map(|category| {
-            let of_category = |densities: &[f64], fractions: &[Vec<f64>]| -> Vec<f64> {
-                let bins = densities.iter().zip(&groups);
-                bins.map(|(density, &bin)| density * fractions[bin][category]).collect()
+            let of_category = |densities: &Population, fractions: &[Vec<f64>]| {
+                grouping.weighed(densities, |bin| fractions[bin][category])
             };
-            let fine = of_category(&densities, &fractions);
+            let population = of_category(&densities, &fractions);
             let replicates = replicates
                 .as_ref()
                 .zip(by_replicate.as_ref())
@@ -239,7 +240,7 @@ pub fn unfold_categories(
                         .collect(),
                     ..of.clone()
                 });
-            density(&all, fine, replicates.as_ref(), &groups, &moments, kernel.unit_volume())
+            density(&all, &population, replicates.as_ref(), &grouping, &moments, kernel)
         })
         .collect();
     Ok(CategoryUnfolding {
@@ -251,35 +252,36 @@ pub fn unfold_categories(
 
 fn density(
     all: &Unfolding,
-    fine: Vec<f64>,
+    population: &Population,
     replicates: Option<&Replicates>,
-    groups: &[usize],
+    grouping: &Grouping,
     moments: &Moments,
-    unit_volume: f64,
+    kernel: &Kernel,
 ) -> CategoryDensity {
     let quantities = Quantities {
-        densities: &fine,
+        densities: population,
         replicates,
     };
     let bins = || all.number_density.iter().enumerate();
-    let number_density = bins().map(|(bin, known)| known.map(|_| sum_of_group(&fine, groups, bin)));
-    let intervals = bins()
-        .map(|(bin, known)| known.and_then(|_| quantities.bin(&|densities| sum_of_group(densities, groups, bin))));
+    let number_density = bins().map(|(bin, known)| known.map(|_| grouping.sum(population, bin)));
+    let intervals =
+        bins().map(|(bin, known)| known.and_then(|_| quantities.bin(&|densities| grouping.sum(densities, bin))));
     CategoryDensity {
         number_density: number_density.collect(),
         intervals: replicates.map(|_| intervals.collect()),
-        total: quantities.estimate(&|densities| densities.iter().sum()),
+        total: quantities.estimate(&Population::total),
         mean_size: quantities.estimate_up_to(moments.largest(), &|densities| {
             moments.mean(densities, Weighing::Number)
         }),
-        volume_fraction: quantities.estimate(&|densities| unit_volume * moments.sum(densities, 3)),
-        fine: fine.clone(),
+        volume_fraction: quantities.estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3)),
+        fine: population.in_bins(kernel.sizes()),
     }
 }
 
 /// Labels of the profiles above the threshold, and what particles show there.
 struct Labels<'a> {
     kernel: &'a Kernel,
+    points: Option<PointKernel>,
     model: CategoryModel,
     /// Counts of each category above the threshold.
     counts: Vec<Vec<f64>>,
@@ -312,6 +314,7 @@ impl<'a> Labels<'a> {
         };
         Self {
             kernel,
+            points: PointKernel::new(kernel, counts, first_row),
             model,
             counts: labelled.iter().map(above).collect(),
             first_row,
@@ -320,21 +323,29 @@ impl<'a> Labels<'a> {
     }
 
     /// Expected counts by profile bin above the threshold and reported size bin.
-    fn expected(&self, densities: &[f64]) -> DMatrix<f64> {
+    fn expected(&self, population: &Population) -> DMatrix<f64> {
         let matrix = self.kernel.matrix();
-        let groups = self.kernel.sizes().groups();
-        let bins = self.kernel.sizes().reported_edges().len() - 1;
-        let mut expected = DMatrix::zeros(matrix.nrows() - self.first_row, bins);
-        for (j, (&group, density)) in groups.iter().zip(densities).enumerate() {
+        let grouping = Grouping::new(self.kernel.sizes());
+        let mut expected = DMatrix::zeros(matrix.nrows() - self.first_row, grouping.bins());
+        for (j, density) in population.spread.iter().enumerate() {
             let column = matrix.column(j);
             let above = column.rows(self.first_row, expected.nrows());
-            expected.column_mut(group).axpy(density * self.scale, &above, 1.0);
+            expected
+                .column_mut(grouping.of_bin(j))
+                .axpy(density * self.scale, &above, 1.0);
+        }
+        for (spike, points) in population.spikes.iter().zip(std::iter::repeat(&self.points)) {
+            let Some(points) = points else { continue };
+            let column = nalgebra::DVector::from_vec(points.column(spike.size));
+            expected
+                .column_mut(grouping.of_size(spike.size))
+                .axpy(spike.density, &column, 1.0);
         }
         expected
     }
 
     /// Fractions by reported bin, from labels of the profiles of these densities; from `start` on if it is known.
-    fn fractions(&self, densities: &[f64], labelled: &[Vec<f64>], start: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
+    fn fractions(&self, densities: &Population, labelled: &[Vec<f64>], start: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
         let expected = self.expected(densities);
         match (self.model, start) {
             (CategoryModel::Constant, _) => constant(labelled, expected.ncols()),

@@ -1,5 +1,6 @@
 //! Kernels, the input of unfolding, and mixtures of the kernels of several particle types.
 
+use crate::profile_law::ProfileLaw;
 use crate::size_bins::{ReportedEdgesError, SizeBins};
 use nalgebra::DMatrix;
 
@@ -30,6 +31,7 @@ pub struct Kernel {
     sizes: SizeBins,
     unit_volume: f64,
     unit_surface: Option<f64>,
+    law: Option<ProfileLaw>,
 }
 
 /// Why a matrix is not a kernel, or kernels cannot be mixed.
@@ -115,6 +117,7 @@ impl Kernel {
             sizes,
             unit_volume,
             unit_surface: None,
+            law: None,
         })
     }
 
@@ -129,6 +132,21 @@ impl Kernel {
         }
         self.unit_surface = Some(unit_surface);
         Ok(self)
+    }
+
+    /// With the profiles of particles of any single size: `up_to(x)` is how many profiles no larger than x a particle
+    /// of size 1 shows, per unit area at one particle per unit volume (H F(x), less what is not seen), for x from 0 to
+    /// 1.
+    ///
+    /// Then the sparse estimate can have particles of exact sizes, where the bins of the kernel hold a range of sizes.
+    #[must_use]
+    pub fn with_profile_law(mut self, up_to: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Self {
+        self.law = Some(ProfileLaw::new(up_to));
+        self
+    }
+
+    pub(crate) fn law(&self) -> Option<&ProfileLaw> {
+        self.law.as_ref()
     }
 
     /// With several of its bins summed to each bin that is reported.
@@ -167,6 +185,8 @@ impl Kernel {
             .sum();
         let mut mixed = Self::new(matrix, first.sizes.clone(), unit_volume)?;
         let surfaces = kernels.iter().zip(fractions);
+        let laws: Option<Vec<ProfileLaw>> = kernels.iter().map(|kernel| kernel.law.clone()).collect();
+        mixed.law = laws.map(|laws| ProfileLaw::mix(laws, fractions.iter().map(|p| p / whole).collect()));
         mixed.unit_surface = surfaces.map(|(kernel, p)| Some(kernel.unit_surface? * p / whole)).sum();
         Ok(mixed)
     }

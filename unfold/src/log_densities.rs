@@ -298,6 +298,8 @@ pub(crate) fn climb(
         penalty.take_off(&theta, &mut slope);
         penalty.add_to(&mut room.information);
         if !room.information.factorise() {
+            // Without its determinant there is no evidence; a penalty this heavy leaves no digits of the information.
+            (value, log_determinant) = (f64::NEG_INFINITY, 0.0);
             break;
         }
         log_determinant = room.information.log_determinant();

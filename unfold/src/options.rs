@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Method {
-    /// Chosen from the data: [`Sparse`](Self::Sparse) if its evidence is 20 times that of
+    /// Chosen from the data: [`Sparse`](Self::Sparse) if its evidence is 55 times that of
     /// [`Penalised`](Self::Penalised), else that.
     #[default]
     Auto,

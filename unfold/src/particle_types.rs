@@ -1,8 +1,10 @@
 //! Several particle types or categories with labelled profiles: eq. (9).
 
 use crate::bootstrap::Replicates;
+use crate::population::{Grouping, Population};
+use crate::size_bins::SizeBins;
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
-use crate::unfolding::{Quantities, Replicated, sum_of_group, unfold_replicated};
+use crate::unfolding::{Quantities, Replicated, unfold_replicated};
 use crate::{Bootstrap, Estimate, Interval, Kernel, ProfileCounts, Resampling, UnfoldError, UnfoldOptions, Unfolding};
 use std::ops::ControlFlow;
 use stereology_metrics::Progress;
@@ -117,23 +119,23 @@ pub fn unfold_types_with_progress(
         parts.push(unfold_replicated(counts, kernel, options, stream, &share)?);
     }
     // Densities of all types one behind the other, and so their replicates.
-    let densities: Vec<f64> = parts.iter().flat_map(|part| part.1.clone()).collect();
-    let replicates = options.bootstrap.map(|bootstrap| joined(&bootstrap, &parts));
+    let densities = one_behind_the_other(parts.iter().map(|part| &part.1), sizes);
+    let replicates = options.bootstrap.map(|bootstrap| joined(&bootstrap, &parts, sizes));
     let quantities = Quantities {
         densities: &densities,
         replicates: replicates.as_ref(),
     };
     let bins = sizes.len();
     let volumes: Vec<f64> = types.iter().map(|(_, kernel)| kernel.unit_volume()).collect();
-    let by_number = |all: &[f64]| weighed(all, &vec![1.0; volumes.len()], bins);
-    let by_volume = |all: &[f64]| weighed(all, &volumes, bins);
+    let by_number = |all: &Population| weighed(all, &vec![1.0; volumes.len()], bins);
+    let by_volume = |all: &Population| weighed(all, &volumes, bins);
     let moments = Moments::new(sizes);
-    let groups = sizes.groups();
+    let grouping = Grouping::new(sizes);
     let reported = sizes.reported_edges().len() - 1;
     let known: Vec<bool> = (0..reported)
         .map(|j| parts.iter().any(|part| part.0.number_density[j].is_some()))
         .collect();
-    let of_bin = |all: &[f64], j: usize| sum_of_group(&by_number(all), &groups, j);
+    let of_bin = |all: &Population, j: usize| grouping.sum(&by_number(all), j);
     let profile_bins = first_counts.counts().len();
     let summed = |of: fn(&Unfolding) -> &Vec<f64>| {
         let mut sum = vec![0.0; profile_bins];
@@ -149,7 +151,7 @@ pub fn unfold_types_with_progress(
             let interval = |j: usize| quantities.bin(&|all| of_bin(all, j)).filter(|_| known[j]);
             (0..reported).map(interval).collect()
         }),
-        total: quantities.estimate(&|all| all.iter().sum()),
+        total: quantities.estimate(&Population::total),
         mean_size: quantities.estimate_up_to(moments.largest(), &|all| {
             moments.mean(&by_number(all), Weighing::Number)
         }),
@@ -169,29 +171,33 @@ pub fn unfold_types_with_progress(
 }
 
 /// Σ over types of weight × density, by bin of the kernel.
-fn weighed(all: &[f64], weights: &[f64], bins: usize) -> Vec<f64> {
+fn weighed(all: &Population, weights: &[f64], bins: usize) -> Population {
     let mut sum = vec![0.0; bins];
-    for (type_densities, weight) in all.chunks(bins).zip(weights) {
+    for (type_densities, weight) in all.spread.chunks(bins).zip(weights) {
         sum.iter_mut()
             .zip(type_densities)
             .for_each(|(sum, n)| *sum += weight * n);
     }
-    sum
+    Population::of_bins(sum)
+}
+
+/// Densities of several populations on the bins of a kernel; those of single sizes are in the bins of their sizes.
+fn one_behind_the_other<'a>(populations: impl Iterator<Item = &'a Population>, sizes: &SizeBins) -> Population {
+    Population::of_bins(populations.flat_map(|of| of.in_bins(sizes)).collect())
 }
 
 /// Replicates of all types, number by number.
-fn joined(bootstrap: &Bootstrap, parts: &[Replicated]) -> Replicates {
+fn joined(bootstrap: &Bootstrap, parts: &[Replicated], sizes: &SizeBins) -> Replicates {
     let replicates: Vec<&Replicates> = parts.iter().filter_map(|part| part.2.as_ref()).collect();
     let numbers = 0..bootstrap.replicates;
-    let base = |of: &&Replicates, number: usize| of.bases[of.base_of[number]].clone();
     Replicates {
         bases: numbers
             .clone()
-            .map(|number| replicates.iter().flat_map(|of| base(of, number)).collect())
+            .map(|number| one_behind_the_other(replicates.iter().map(|of| &of.bases[of.base_of[number]]), sizes))
             .collect(),
         base_of: numbers.clone().collect(),
         densities: numbers
-            .map(|number| replicates.iter().flat_map(|of| of.densities[number].clone()).collect())
+            .map(|number| one_behind_the_other(replicates.iter().map(|of| &of.densities[number]), sizes))
             .collect(),
         bootstrap: *bootstrap,
         slices: replicates.iter().filter_map(|of| of.slices).min(),

@@ -4,12 +4,15 @@
 //! the integral of likelihood times prior over θ, by Laplace's approximation:
 //!
 //! ```text
-//! ln p(n | λ, r) ≈ ℓ(θ̂) − λ/2 |Dθ̂|² + (m − r)/2 ln λ + ½ ln |DDᵀ| − ½ ln |I + λ DᵀD| − r ln(σ √m)
+//! ln p(n | λ, r) ≈ ℓ(θ̂) − λ/2 |Dθ̂|² + (m − r)/2 ln λ + ½ ln |DDᵀ| − ½ ln |I + λ DᵀD| − r ln(2√m) − Σ β² / (2 σ² m)
 //! ```
 //!
-//! The last term is the cost of the r directions that the penalty leaves free (polynomials below degree r), each with
-//! a standard deviation of σ = 1 per node. Fits are made for r = 1, 2, 3 at λ = 10^k, and at half decades around the
-//! best. Their log-densities are averaged with the evidence as weights (empirical Bayes without a manual choice).
+//! The last terms are the cost of the r directions that the penalty leaves free (polynomials below degree r). θ̂ has
+//! the component β along each, which has a standard deviation of σ = 5 per node, and odds of two to one against it;
+//! for the level, whose unit is arbitrary, only the first of the terms counts. Without the last term a parabola as
+//! steep as particles of one size need would be as likely as any other. Fits are made for r = 1, 2, 3 at λ = 10^k,
+//! and at half decades around the best. Their log-densities are averaged with the evidence as weights (empirical
+//! Bayes without a manual choice).
 //!
 //! A log-density need not be equally smooth everywhere. Where one population of particles gives way to another,
 //! ln(e^a + e^b) bends within a few nodes, and at the smallest sizes of a population it drops steeply. A penalty weak
@@ -19,10 +22,13 @@
 //! by .008 to .012 for the bimodal distribution of figure 7 and by .015 for the lognormal one, and did not change it
 //! for the single mode. Widths of .08 to .15, depths of 10³ and 10⁴, and five or nine places gave similar results.
 
+use crate::cholesky::dot;
 use crate::log_densities::{Design, Effort, Peak, Penalty, Start, Workspace, climb};
 
-/// Standard deviation σ of the log-densities along the polynomials that a penalty leaves free.
-const FREE_SPREAD: f64 = 1.0;
+/// Standard deviation σ, per node, of the log-densities along the polynomials that a penalty leaves free.
+const FREE_SPREAD: f64 = 5.0;
+/// Prior odds against every such direction.
+const ODDS: f64 = 2.0;
 /// Decimal logarithm of the largest weight, by order, for [`REFERENCE_NODES`] nodes; its fit is almost a polynomial.
 const HEAVIEST: [f64; 3] = [5.0, 6.0, 7.0];
 const REFERENCE_NODES: f64 = 40.0;
@@ -108,8 +114,9 @@ pub(crate) fn smooth(design: &Design, counts: &[f64]) -> SmoothFit {
 /// is too low; then at half steps around the best; then with bends.
 fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> Vec<Step> {
     let nodes = design.nodes();
-    let constant =
-        0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (FREE_SPREAD * (nodes as f64).sqrt()).ln();
+    let spread = (nodes as f64).sqrt();
+    let constant = 0.5 * Penalty::log_pseudo_determinant(nodes, order) - order as f64 * (ODDS * spread).ln();
+    let free = polynomials(nodes, order);
     // The same roughness on finer nodes: differences of order r are proportional to the spacing to the power r.
     let finer = (2 * order - 1) as f64 * (nodes as f64 / REFERENCE_NODES).log10();
     let mut best_yet = f64::NEG_INFINITY;
@@ -119,7 +126,8 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
         let beside = 0.5 * roughness.log_weights() + constant;
         let effort = Effort::BRIEF.unless_below(best_yet - ENOUGH - beside);
         let peak = climb(design, counts, &roughness, start, effort, room);
-        let evidence = peak.value - 0.5 * peak.log_determinant + beside;
+        let along = |polynomial: &Vec<f64>| (dot(polynomial, &peak.theta) / (FREE_SPREAD * spread)).powi(2);
+        let evidence = peak.value - 0.5 * peak.log_determinant + beside - 0.5 * free.iter().map(along).sum::<f64>();
         best_yet = best_yet.max(evidence);
         Step {
             penalty,
@@ -166,6 +174,26 @@ fn path(design: &Design, counts: &[f64], order: usize, room: &mut Workspace) -> 
         }
     }
     steps
+}
+
+/// Orthonormal polynomials of degrees 1 to `order` − 1 on the nodes: the shapes that a penalty leaves free.
+fn polynomials(nodes: usize, order: usize) -> Vec<Vec<f64>> {
+    let level = vec![1.0 / (nodes as f64).sqrt(); nodes];
+    let mut found = vec![level];
+    for degree in 1..order {
+        let middle = 0.5 * (nodes as f64 - 1.0);
+        let mut values: Vec<f64> = (0..nodes)
+            .map(|k| (k as f64 - middle).powi(i32::try_from(degree).unwrap_or(1)))
+            .collect();
+        for lower in &found {
+            let part = dot(lower, &values);
+            values.iter_mut().zip(lower).for_each(|(value, of)| *value -= part * of);
+        }
+        let length = dot(&values, &values).sqrt();
+        values.iter_mut().for_each(|value| *value /= length);
+        found.push(values);
+    }
+    found.split_off(1)
 }
 
 /// The density that, equal at all nodes, gives the observed number of profiles.

@@ -3,6 +3,8 @@
 use crate::grid::{Grid, grids};
 use crate::kernel::Kernel;
 use crate::options::{Bootstrap, UnfoldOptions};
+use crate::point_kernel::PointKernel;
+use crate::population::Population;
 use crate::profile_counts::ProfileCounts;
 use crate::unfold_error::UnfoldError;
 use nalgebra::{DMatrix, DVector};
@@ -15,6 +17,10 @@ pub(crate) struct Problem {
     pub(crate) coarse: DMatrix<f64>,
     /// Internal grids of the smooth estimate, made from the kept bins.
     pub(crate) grids: Vec<Grid>,
+    /// Expected counts of particles of single sizes, if the kernel knows them.
+    pub(crate) points: Option<PointKernel>,
+    /// Middle size of each kept bin.
+    pub(crate) middles: Vec<f64>,
     /// Counts above the threshold over their dispersion.
     pub(crate) counts: Vec<f64>,
     /// Index of each kept bin among the kernel's.
@@ -56,7 +62,9 @@ impl Problem {
         let scale = counts.area() / counts.dispersion();
         let fine = rows.select_columns(&columns) * scale;
         let sizes = kernel.sizes();
-        let width = |j: usize| sizes.edges()[j + 1] - sizes.edges()[j];
+        let last = sizes.reported_edges()[sizes.reported_edges().len() - 1];
+        // Sizes above the last reported edge are no part of a bin with sizes spread evenly over it.
+        let width = |j: usize| (sizes.edges()[j + 1].min(last) - sizes.edges()[j]).max(0.0);
         let mean_width = columns.iter().map(|&j| width(j)).sum::<f64>() / columns.len() as f64;
         let widths: Vec<f64> = columns.iter().map(|&j| width(j) / mean_width).collect();
         let groups = sizes.groups();
@@ -82,7 +90,9 @@ impl Problem {
             .map(|&j| (sizes.edges()[j], sizes.edges()[j + 1]))
             .collect();
         Ok(Self {
-            grids: grids(&fine, &kept_edges, sizes.is_spread()),
+            grids: grids(&fine, &kept_edges, sizes.is_spread(), last),
+            points: PointKernel::new(kernel, counts, first_row),
+            middles: kept_edges.iter().map(|bin| 0.5 * (bin.0 + bin.1)).collect(),
             fine,
             coarse,
             counts: kept.iter().map(|count| count / counts.dispersion()).collect(),
@@ -99,28 +109,28 @@ impl Problem {
         self.parts.iter().map(|&(group, share)| coarse[group] * share).collect()
     }
 
-    /// Densities of the reported bins from those of the kept ones.
-    pub(crate) fn gather(&self, fine: &[f64]) -> Vec<f64> {
-        let mut coarse = vec![0.0; self.reported.len()];
-        for (&(group, _), density) in self.parts.iter().zip(fine) {
-            coarse[group] += density;
-        }
-        coarse
-    }
-
     /// Expected counts.
-    pub(crate) fn refold(&self, fine: &[f64]) -> Vec<f64> {
-        let expected = &self.fine * DVector::from_column_slice(fine);
+    pub(crate) fn refold(&self, population: &Population) -> Vec<f64> {
+        let mut expected = &self.fine * DVector::from_column_slice(&population.spread);
+        if let Some(points) = &self.points {
+            for spike in &population.spikes {
+                let column = DVector::from_vec(points.column(spike.size));
+                expected.axpy(spike.density, &column, 1.0);
+            }
+        }
         expected.iter().copied().collect()
     }
 
-    /// Densities of all bins of the kernel; zero where there is none.
-    pub(crate) fn widen(&self, fine: &[f64], bins: usize) -> Vec<f64> {
-        let mut wide = vec![0.0; bins];
-        for (&j, &density) in self.columns.iter().zip(fine) {
-            wide[j] = density;
+    /// The population on all bins of the kernel; zero where there is none.
+    pub(crate) fn widen(&self, population: &Population, bins: usize) -> Population {
+        let mut spread = vec![0.0; bins];
+        for (&j, &density) in self.columns.iter().zip(&population.spread) {
+            spread[j] = density;
         }
-        wide
+        Population {
+            spread,
+            spikes: population.spikes.clone(),
+        }
     }
 }
 

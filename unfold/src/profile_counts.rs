@@ -33,6 +33,8 @@ pub struct ProfileCounts {
     /// Counts of each slice.
     slices: Option<Vec<Vec<f64>>>,
     tiles: Option<Tiles>,
+    /// Size of the largest profile, if sizes were counted.
+    largest: Option<f64>,
 }
 
 /// Counts of the tiles of a photograph.
@@ -198,6 +200,7 @@ impl ProfileCounts {
             areas,
             slices: None,
             tiles: None,
+            largest: sizes.iter().copied().reduce(f64::max),
         })
     }
 
@@ -336,6 +339,7 @@ impl ProfileCounts {
                 .collect(),
             slices: None,
             tiles: None,
+            largest: None,
         })
     }
 
@@ -414,6 +418,11 @@ impl ProfileCounts {
 
     pub(crate) fn tiles(&self) -> Option<&Tiles> {
         self.tiles.as_ref()
+    }
+
+    /// Size of the largest profile, if it is known.
+    pub(crate) fn largest(&self) -> Option<f64> {
+        self.largest
     }
 
     /// Counts of each slice.

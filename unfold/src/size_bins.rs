@@ -167,11 +167,13 @@ impl SizeBins {
         })
     }
 
-    /// The same bins, several of them summed to each bin that is reported.
+    /// The same bins, several of them summed to each bin that is reported. Bins above the last reported edge belong to
+    /// the last reported bin: the largest particles may be larger than the largest profile.
     ///
     /// # Errors
     ///
-    /// [`ReportedEdgesError`] if the edges bound no bins or are not among these, first and last included.
+    /// [`ReportedEdgesError`] if the edges bound no bins or are not among these, or the first is not the first of
+    /// these.
     pub fn reported_in(mut self, reported: &[f64]) -> Result<Self, ReportedEdgesError> {
         check_edges(reported)?;
         let known = |value: f64| {
@@ -182,12 +184,8 @@ impl SizeBins {
         if let Some(&value) = reported.iter().find(|value| !known(**value)) {
             return Err(ReportedEdgesError::NotAnEdge { value });
         }
-        let ends = |edges: &[f64]| (edges[0], edges[edges.len() - 1]);
-        let ((first, last), (own_first, own_last)) = (ends(reported), ends(&self.edges));
-        for (value, own) in [(first, own_first), (last, own_last)] {
-            if (value - own).abs() > 1e-9 * self.largest() {
-                return Err(ReportedEdgesError::NotAnEdge { value: own });
-            }
+        if (reported[0] - self.edges[0]).abs() > 1e-9 * self.largest() {
+            return Err(ReportedEdgesError::NotAnEdge { value: self.edges[0] });
         }
         self.reported = reported.to_vec();
         Ok(self)
@@ -209,6 +207,7 @@ impl SizeBins {
         self.edges
             .windows(2)
             .map(|bin| self.reported.partition_point(|&edge| edge < middle(bin)) - 1)
+            .map(|group| group.min(self.reported.len() - 2))
             .collect()
     }
 

@@ -1,6 +1,7 @@
 //! The size distribution: means and percentiles by number and by volume, and the sieve curve.
 
 use crate::estimate::Estimate;
+use crate::population::Population;
 use crate::size_bins::SizeBins;
 
 /// Shares of particles at which [`Percentiles`] are given.
@@ -83,12 +84,19 @@ impl Moments {
     }
 
     /// Σ N ⟨D^power⟩.
-    pub(crate) fn sum(&self, densities: &[f64], power: usize) -> f64 {
-        densities.iter().zip(&self.powers[power]).map(|(n, m)| n * m).sum()
+    pub(crate) fn sum(&self, population: &Population, power: usize) -> f64 {
+        let spread: f64 = population
+            .spread
+            .iter()
+            .zip(&self.powers[power])
+            .map(|(n, m)| n * m)
+            .sum();
+        let spikes = population.spikes.iter();
+        spread + spikes.map(|of| of.density * power_of(of.size, power)).sum::<f64>()
     }
 
     /// Mean size; zero without particles.
-    pub(crate) fn mean(&self, densities: &[f64], weighing: Weighing) -> f64 {
+    pub(crate) fn mean(&self, densities: &Population, weighing: Weighing) -> f64 {
         let power = usize::from(weighing == Weighing::Volume) * 3;
         let whole = self.sum(densities, power);
         if whole > 0.0 {
@@ -99,7 +107,13 @@ impl Moments {
     }
 
     /// The size below which a fraction of the particles lies.
-    pub(crate) fn percentile(&self, densities: &[f64], weighing: Weighing, share: f64) -> f64 {
+    ///
+    /// An estimate has particles spread over bins or of single sizes, not both.
+    pub(crate) fn percentile(&self, population: &Population, weighing: Weighing, share: f64) -> f64 {
+        if !population.spikes.is_empty() {
+            return percentile_of_spikes(population, weighing, share);
+        }
+        let densities = &population.spread;
         let moments = &self.powers[usize::from(weighing == Weighing::Volume) * 3];
         let power = weighing.power() + 1;
         let wanted = share * densities.iter().zip(moments).map(|(n, m)| n * m).sum::<f64>();
@@ -120,15 +134,40 @@ impl Moments {
     }
 
     /// Share of the particles' volume in bins up to an edge of the bins.
-    pub(crate) fn passing(&self, densities: &[f64], edge: f64) -> f64 {
-        let volume = self.sum(densities, 3);
-        let below = self.edges[1..].iter().zip(densities).zip(&self.powers[3]);
+    pub(crate) fn passing(&self, population: &Population, edge: f64) -> f64 {
+        let volume = self.sum(population, 3);
+        let passes = |size: f64| size <= edge * (1.0 + 1e-12);
+        let below = self.edges[1..].iter().zip(&population.spread).zip(&self.powers[3]);
         let below: f64 = below
-            .filter(|((upper, _), _)| **upper <= edge * (1.0 + 1e-12))
+            .filter(|((upper, _), _)| passes(**upper))
             .map(|((_, n), m)| n * m)
             .sum();
+        let spikes = population.spikes.iter().filter(|of| passes(of.size));
+        let below = below + spikes.map(|of| of.density * power_of(of.size, 3)).sum::<f64>();
         if volume > 0.0 { below / volume } else { 0.0 }
     }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // Powers are at most 4.
+fn power_of(size: f64, power: usize) -> f64 {
+    size.powi(power as i32)
+}
+
+/// The smallest size with at least a fraction of the particles up to it.
+fn percentile_of_spikes(population: &Population, weighing: Weighing, share: f64) -> f64 {
+    let mut spikes: Vec<(f64, f64)> = population
+        .spikes
+        .iter()
+        .map(|of| (of.size, of.density * of.size.powi(weighing.power())))
+        .collect();
+    spikes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let wanted = share * spikes.iter().map(|of| of.1).sum::<f64>();
+    let mut below = 0.0;
+    let reached = spikes.iter().find(|of| {
+        below += of.1;
+        below >= wanted
+    });
+    reached.or(spikes.last()).map_or(0.0, |of| of.0)
 }
 
 /// The distribution, with `estimate` giving a quantity of the densities, up to a limit, its value and interval; where
@@ -136,7 +175,7 @@ impl Moments {
 pub(crate) fn describe(
     moments: &Moments,
     reported_edges: &[f64],
-    estimate: impl Fn(Weighing, f64, &dyn Fn(&[f64]) -> f64) -> Estimate,
+    estimate: impl Fn(Weighing, f64, &dyn Fn(&Population) -> f64) -> Estimate,
 ) -> SizeDistribution {
     let percentiles = |weighing: Weighing| Percentiles {
         mean: estimate(weighing, moments.largest(), &|densities| {
@@ -151,9 +190,18 @@ pub(crate) fn describe(
     SizeDistribution {
         by_number: percentiles(Weighing::Number),
         by_volume: percentiles(Weighing::Volume),
+        // The last bin holds larger particles too.
         passing: reported_edges
             .iter()
-            .map(|&edge| estimate(Weighing::Volume, 1.0, &|densities| moments.passing(densities, edge)))
+            .enumerate()
+            .map(|(k, &edge)| {
+                if k + 1 == reported_edges.len() {
+                    f64::INFINITY
+                } else {
+                    edge
+                }
+            })
+            .map(|edge| estimate(Weighing::Volume, 1.0, &|densities| moments.passing(densities, edge)))
             .collect(),
     }
 }
@@ -161,6 +209,7 @@ pub(crate) fn describe(
 #[cfg(test)]
 mod tests {
     use super::{Moments, Weighing};
+    use crate::population::Population;
     use crate::{SizeBins, equal_edges};
     use proptest::prelude::*;
 
@@ -170,7 +219,7 @@ mod tests {
     fn a_flat_distribution_has_its_known_percentiles() {
         let edges = equal_edges(1.0, 8);
         let moments = Moments::new(&SizeBins::integrated(&edges).unwrap());
-        let flat = [1.0; 8];
+        let flat = Population::of_bins(vec![1.0; 8]);
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         close(moments.mean(&flat, Weighing::Number), 0.5);
         close(moments.percentile(&flat, Weighing::Number, 0.5), 0.5);
@@ -178,7 +227,10 @@ mod tests {
         close(moments.percentile(&flat, Weighing::Volume, 0.5), 0.5_f64.powf(0.25));
         close(moments.passing(&flat, 0.5), 1.0 / 16.0);
         close(moments.passing(&flat, 1.0), 1.0);
-        close(moments.percentile(&[0.0; 8], Weighing::Volume, 0.5), 0.0);
+        close(
+            moments.percentile(&Population::of_bins(vec![0.0; 8]), Weighing::Volume, 0.5),
+            0.0,
+        );
     }
 
     proptest! {
@@ -186,6 +238,7 @@ mod tests {
         #[test]
         fn percentiles_are_ordered(densities in prop::collection::vec(0.0..1.0_f64, 6)) {
             prop_assume!(densities.iter().sum::<f64>() > 0.1);
+            let densities = Population::of_bins(densities);
             for bins in [SizeBins::integrated(&equal_edges(3.0, 6)).unwrap(), SizeBins::upper_edge(&equal_edges(3.0, 6)).unwrap()] {
                 let moments = Moments::new(&bins);
                 let mut last = 0.0;

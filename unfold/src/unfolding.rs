@@ -2,15 +2,19 @@
 
 use crate::bootstrap::{Deviation, Parts, Replicates, Source, parts, replicate};
 use crate::estimate::{CrossCheck, Estimate, Interval};
-use crate::estimator::{Fit, again, estimate, workspace};
+use crate::estimator::{Fit, again, base, estimate, workspace};
 use crate::findings::findings;
 use crate::goodness::{missing_fines, p_value_of_model, poor_fit};
 use crate::kernel::{Kernel, condition_number};
 use crate::options::{Bootstrap, Method, UnfoldOptions};
+use crate::point_kernel::PointKernel;
+use crate::population::{Grouping, Population};
 use crate::problem::Problem;
 use crate::profile_counts::{ProfileCounts, mean_profile_area};
 use crate::size_distribution::{Moments, SizeDistribution, Weighing, describe};
 use crate::unfold_error::UnfoldError;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
 use stereology_metrics::{Finding, Progress};
 
@@ -74,7 +78,7 @@ pub struct Unfolding {
     pub threshold: f64,
     /// The estimator that was used; never [`Method::Auto`].
     pub method: Method,
-    /// ln evidence of the sparse estimate less that of the smooth one, if [`Method::Auto`] chose: sparse from 3 on.
+    /// ln evidence of the sparse estimate less that of the smooth one, if [`Method::Auto`] chose: sparse from 4 on.
     pub evidence_for_sparse: Option<f64>,
     /// ln evidence of the estimate: only differences count, between kernels on the same profile bins.
     pub evidence: Option<f64>,
@@ -167,8 +171,8 @@ pub fn unfold_with_progress(
     unfold_replicated(counts, kernel, options, 0, progress).map(|(unfolding, ..)| unfolding)
 }
 
-/// An unfolding, its densities on all bins of the kernel, and those of its bootstrap.
-pub(crate) type Replicated = (Unfolding, Vec<f64>, Option<Replicates>);
+/// An unfolding, its population on all bins of the kernel, and those of its bootstrap.
+pub(crate) type Replicated = (Unfolding, Population, Option<Replicates>);
 
 /// Unfolds, with the bootstrap drawn from streams beginning at `stream`.
 pub(crate) fn unfold_replicated(
@@ -198,7 +202,7 @@ pub(crate) fn unfold_replicated(
         }
     };
     let unfolding = result(&problem, counts, kernel, options, &fit, replicates.as_ref());
-    Ok((unfolding, problem.widen(&fit.densities, bins), replicates))
+    Ok((unfolding, problem.widen(&fit.population, bins), replicates))
 }
 
 /// Counts drawn from each of the fits that the counts allow, in proportion to their weight, and fitted again.
@@ -214,10 +218,12 @@ fn resampled(
     bins: usize,
 ) -> Result<Replicates, UnfoldError> {
     let mut room = workspace(problem);
+    let mut rng = ChaCha8Rng::seed_from_u64(bootstrap.seed);
+    rng.set_stream(BASES);
     let bases = fit
         .again
         .iter()
-        .map(|(_, refit)| again(problem, &problem.counts, refit, options, &mut room))
+        .map(|(_, refit)| base(problem, refit, options, &mut room, &mut rng))
         .collect::<Result<Vec<_>, _>>()?;
     let expected: Vec<Vec<f64>> = bases.iter().map(|base| problem.refold(base)).collect();
     let whole: f64 = fit.again.iter().map(|(weight, _)| weight).sum();
@@ -240,7 +246,7 @@ fn resampled(
         problem.columns.len(),
         progress,
         || workspace(problem),
-        |task, drawn, room| again(problem, drawn, &fit.again[base_of[task]].1, options, room),
+        |task, drawn, room, rng| again(problem, drawn, &fit.again[base_of[task]].1, options, room, rng),
     )?;
     Ok(Replicates {
         bases: bases.iter().map(|base| problem.widen(base, bins)).collect(),
@@ -251,29 +257,32 @@ fn resampled(
     })
 }
 
+/// First stream of random numbers that are drawn for the estimate itself.
+const BASES: u64 = 1 << 61;
+
 /// Quantities of densities on all bins of a kernel, with their intervals.
 pub(crate) struct Quantities<'a> {
-    pub(crate) densities: &'a [f64],
+    pub(crate) densities: &'a Population,
     pub(crate) replicates: Option<&'a Replicates>,
 }
 
 impl Quantities<'_> {
-    pub(crate) fn estimate(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
+    pub(crate) fn estimate(&self, quantity: &dyn Fn(&Population) -> f64) -> Estimate {
         self.estimate_up_to(f64::INFINITY, quantity)
     }
 
     /// Estimate of a quantity that cannot be larger than `most`: a fraction or a size.
-    pub(crate) fn estimate_up_to(&self, most: f64, quantity: &dyn Fn(&[f64]) -> f64) -> Estimate {
+    pub(crate) fn estimate_up_to(&self, most: f64, quantity: &dyn Fn(&Population) -> f64) -> Estimate {
         let value = quantity(self.densities);
         Estimate {
             value,
             interval: self
                 .replicates
-                .map(|replicates| replicates.interval(value, most, Deviation::Spread, quantity)),
+                .map(|replicates| replicates.interval(value, most, Deviation::Ratio, quantity)),
         }
     }
 
-    pub(crate) fn bin(&self, quantity: &dyn Fn(&[f64]) -> f64) -> Option<Interval> {
+    pub(crate) fn bin(&self, quantity: &dyn Fn(&Population) -> f64) -> Option<Interval> {
         let value = quantity(self.densities);
         self.replicates
             .map(|replicates| replicates.interval(value, f64::INFINITY, Deviation::SpreadAndBias, quantity))
@@ -290,29 +299,25 @@ fn result(
 ) -> Unfolding {
     let sizes = kernel.sizes();
     let moments = Moments::new(sizes);
-    let densities = problem.widen(&fit.densities, sizes.len());
+    let densities = problem.widen(&fit.population, sizes.len());
     let quantities = Quantities {
         densities: &densities,
         replicates,
     };
-    let estimate = |quantity: &dyn Fn(&[f64]) -> f64| quantities.estimate(quantity);
-    let coarse = problem.gather(&fit.densities);
-    let bins = sizes.reported_edges().len() - 1;
-    let mut number_density = vec![None; bins];
-    let mut intervals = vec![None; bins];
-    let groups = sizes.groups();
-    for (&bin, &density) in problem.reported.iter().zip(&coarse) {
-        number_density[bin] = Some(density);
-        intervals[bin] = quantities.bin(&|densities| sum_of_group(densities, &groups, bin));
+    let estimate = |quantity: &dyn Fn(&Population) -> f64| quantities.estimate(quantity);
+    let grouping = Grouping::new(sizes);
+    let mut number_density = vec![None; grouping.bins()];
+    let mut intervals = vec![None; grouping.bins()];
+    for &bin in &problem.reported {
+        number_density[bin] = Some(grouping.sum(&densities, bin));
+        intervals[bin] = quantities.bin(&|densities| grouping.sum(densities, bin));
     }
-    let refolded: Vec<f64> = {
-        let wide = nalgebra::DVector::from_column_slice(&densities);
-        (kernel.matrix() * wide).iter().copied().collect()
-    };
+    let coarse: Vec<f64> = number_density.iter().copied().flatten().collect();
+    let refolded = refolded(counts, kernel, &densities);
     // Not cut at 1: a fraction above 1 says that area, sizes or shape are wrong.
     let volume_fraction = quantities.estimate(&|densities| kernel.unit_volume() * moments.sum(densities, 3));
     let rows = problem.counts.len();
-    let expected = problem.refold(&fit.densities);
+    let expected = problem.refold(&fit.population);
     let p_value = p_value_of_model(&problem.fine, &problem.counts, &expected, fit.parameters);
     let mut findings = findings(problem, counts, kernel, options, fit, &coarse);
     findings.extend(poor_fit(p_value));
@@ -322,7 +327,7 @@ fn result(
     Unfolding {
         edges: sizes.reported_edges().to_vec(),
         intervals: replicates.map(|_| intervals),
-        total: estimate(&|densities| densities.iter().sum()),
+        total: estimate(&Population::total),
         mean_size: quantities.estimate_up_to(moments.largest(), &|densities| {
             moments.mean(densities, Weighing::Number)
         }),
@@ -370,10 +375,16 @@ fn result(
     }
 }
 
-/// Density of a reported bin.
-pub(crate) fn sum_of_group(densities: &[f64], groups: &[usize], bin: usize) -> f64 {
-    let of_bin = densities.iter().zip(groups).filter(|(_, group)| **group == bin);
-    of_bin.map(|(density, _)| density).sum()
+/// Profiles per unit area by profile bin, below the threshold too.
+fn refolded(counts: &ProfileCounts, kernel: &Kernel, population: &Population) -> Vec<f64> {
+    let mut refolded = kernel.matrix() * nalgebra::DVector::from_column_slice(&population.spread);
+    if let Some(points) = PointKernel::new(kernel, counts, 0) {
+        for spike in &population.spikes {
+            let column = nalgebra::DVector::from_vec(points.column(spike.size));
+            refolded.axpy(spike.density * counts.dispersion() / counts.area(), &column, 1.0);
+        }
+    }
+    refolded.iter().copied().collect()
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Between zero and the number of rows.

@@ -138,9 +138,9 @@ fn likeness(
     let mixed = Kernel::mix(kernels, fractions)?;
     let problem = Problem::new(counts, &mixed, options)?;
     let fit = estimate(&problem, &problem.counts, options)?;
-    let mean = problem.refold(&fit.densities);
-    let densities = problem.widen(&fit.densities, mixed.sizes().len());
-    let wide = nalgebra::DVector::from_column_slice(&densities);
+    let mean = problem.refold(&fit.population);
+    let population = problem.widen(&fit.population, mixed.sizes().len());
+    let wide = nalgebra::DVector::from_vec(population.in_bins(mixed.sizes()));
     let scale = counts.area() / counts.dispersion();
     let columns: Vec<_> = kernels
         .iter()

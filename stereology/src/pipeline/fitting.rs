@@ -5,8 +5,8 @@ use std::borrow::Cow;
 
 use crate::pipeline::section_model::reported;
 use crate::pipeline::{
-    Clusters, DensityError, DensityOptions, LargestParticle, MeasuredProfiles, ParticleTypes, Spacing, TypeFractions,
-    UnfoldingBins, capping_angle, largest_particle, size_edges, type_fractions,
+    Clusters, DensityError, DensityOptions, LargestParticle, LargestSize, MeasuredProfiles, ParticleTypes, Spacing,
+    TypeFractions, UnfoldingBins, capping_angle, largest_particle, size_edges, type_fractions,
 };
 use stereology_kmatrix::Sizes;
 use stereology_metrics::{Finding, Progress};
@@ -29,6 +29,8 @@ pub(crate) struct Fitting<'a> {
     sizes: Sizes,
     edges: Vec<f64>,
     threshold: f64,
+    /// The largest size that particles may have.
+    top: f64,
     angle: f64,
     bins: UnfoldingBins,
     /// The estimator, with the threshold of the fit.
@@ -78,6 +80,9 @@ impl<'a> Fitting<'a> {
             }
         };
         let threshold = settled_threshold(&edges, limit);
+        // Measured with an error, the largest profile is larger than the largest particle rather than smaller.
+        let largest = settled.largest.as_ref().filter(|_| profiles.size_error <= 0.0);
+        let top = largest_possible(&edges, largest);
         let unfold = with_threshold(&options.unfold, threshold);
         let (angle, capping) = capping_angle(profiles, types, options.capping, &edges, &unfold)?;
         settled.capping = capping;
@@ -90,8 +95,16 @@ impl<'a> Fitting<'a> {
         let clusters = Clusters::of(profiles, &places, options.unfold.bootstrap.as_ref());
         Ok(Self {
             bins: types
-                .unfolding_bins(&edges, profiles.smallest(), threshold, unfold.method, options.sizes)
+                .unfolding_bins(
+                    &edges,
+                    profiles.smallest(),
+                    threshold,
+                    top,
+                    unfold.method,
+                    options.sizes,
+                )
                 .with_size_error(profiles.size_error, profiles.smallest(), threshold),
+            top,
             profiles,
             types,
             sizes: options.sizes,
@@ -202,6 +215,7 @@ impl<'a> Fitting<'a> {
             &edges,
             self.profiles.smallest(),
             self.threshold,
+            self.top,
             self.unfold.method,
             self.sizes,
         );
@@ -242,6 +256,18 @@ fn with_threshold(options: &UnfoldOptions, threshold: f64) -> UnfoldOptions {
         ..*options
     }
 }
+
+/// The largest size that particles may have: larger than the last edge if that is only the largest profile, which is
+/// rarely one of the largest particle's largest profiles.
+fn largest_possible(edges: &[f64], largest: Option<&LargestParticle>) -> f64 {
+    let last = edges.last().copied().unwrap_or(0.0);
+    let observed = largest.filter(|of| of.method == LargestSize::Profile && (of.size - last).abs() <= 1e-9 * last);
+    observed.map_or(last, |of| BEYOND * of.size)
+}
+
+/// No particle is larger than this times the largest profile. For lognormal sizes of σ = 1 and 200 profiles a larger
+/// factor changes the volume fraction by less than its standard error.
+const BEYOND: f64 = 1.5;
 
 /// The threshold, raised to the upper edge of its bin if that edge is less than [`OBSERVED`] times the threshold.
 ///

@@ -1,7 +1,7 @@
 //! Profiles as they were measured on sections, and why they cannot be unfolded.
 
 use crate::pipeline::ParticleTypesError;
-use stereology_unfold::{ProfilesError, UnfoldError};
+use stereology_unfold::{ProfilesError, UnfoldError, smallest_size};
 
 /// Profiles measured on sections: one entry per profile in each list.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,14 +49,15 @@ impl MeasuredProfiles {
         Ok(counted)
     }
 
-    /// Size of the smallest profile with a positive weight; infinite without one.
+    /// Size of the smallest profiles with a positive weight that a fit resolves ([`smallest_size`]); infinite without
+    /// one.
     pub(crate) fn smallest(&self) -> f64 {
-        let counted = self
-            .sizes
-            .iter()
-            .zip(&self.weights)
-            .filter(|(_, weight)| **weight > 0.0);
-        counted.map(|(size, _)| *size).fold(f64::INFINITY, f64::min)
+        let sizes = self.sizes.iter().zip(&self.weights);
+        let counted: Vec<f64> = sizes
+            .filter(|(_, weight)| **weight > 0.0)
+            .map(|(size, _)| *size)
+            .collect();
+        smallest_size(&counted)
     }
 
     /// Whether the particle type of every profile is known.

@@ -259,7 +259,18 @@ impl ParticleType {
             why: error.to_string(),
         })?;
         let unit_surface = self.law.surface_area() / self.law.size().powi(2);
-        Ok(Kernel::new(matrix, bins, self.law.unit_volume())?.with_unit_surface(unit_surface)?)
+        let kernel = Kernel::new(matrix, bins, self.law.unit_volume())?.with_unit_surface(unit_surface)?;
+        Ok(kernel.with_profile_law(self.profile_law(0.0)))
+    }
+}
+
+impl ParticleType {
+    /// How many profiles no larger than x a particle of size 1 shows per unit area, at one particle per unit volume,
+    /// under a capping angle in radians.
+    pub(crate) fn profile_law(&self, angle: f64) -> impl Fn(f64) -> f64 + Send + Sync + use<> {
+        let law = self.law.clone();
+        let (caliper, seen) = (law.caliper_effective() / law.size(), angle.sin());
+        move |x| caliper * law.cdf(x.max(seen))
     }
 }
 

@@ -184,9 +184,10 @@ impl ParticleTypes {
                     edges.clone(),
                     law.unit_volume(),
                 );
-                kernel?.with_unit_surface(law.surface_area() / law.size().powi(2))
+                let kernel = kernel?.with_unit_surface(law.surface_area() / law.size().powi(2))?;
+                Ok(kernel.with_profile_law(of.profile_law(angle)))
             })
-            .collect::<Result<Vec<_>, _>>()
+            .collect::<Result<Vec<_>, stereology_unfold::KernelError>>()
             .map_err(stereology_unfold::UnfoldError::from)?;
         let shares: Vec<f64> = self.types().iter().map(|of| of.share).collect();
         Ok(Kernel::mix(&kernels, &shares).map_err(stereology_unfold::UnfoldError::from)?)

@@ -71,22 +71,24 @@ impl UnfoldingBins {
     }
 
     /// [`new`](Self::new) with bins from which grids of linear, root and logarithmic spacing can be made, the last from
-    /// `smallest` on: the size of the smallest profile.
+    /// `smallest`, the size of the smallest profile, to `top`: the largest size that particles may have, if that is
+    /// larger than the last edge.
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::UnfoldingBins, unfold::Method};
-    /// let bins = UnfoldingBins::for_profiles(&[0.0, 0.5, 1.0], 0.01, 0.0, Method::Auto, Sizes::Integrated);
+    /// let bins = UnfoldingBins::for_profiles(&[0.0, 0.5, 1.0], 0.01, 0.0, 1.5, Method::Auto, Sizes::Integrated);
     /// assert!(bins.profile_edges.len() > 101 && bins.size_edges.len() > 80);
+    /// assert_eq!(bins.size_edges.last(), Some(&1.5));
     /// ```
     #[must_use]
-    pub fn for_profiles(edges: &[f64], smallest: f64, threshold: f64, method: Method, sizes: Sizes) -> Self {
+    pub fn for_profiles(edges: &[f64], smallest: f64, threshold: f64, top: f64, method: Method, sizes: Sizes) -> Self {
         let fits_grids = matches!(method, Method::Auto | Method::Penalised | Method::Sparse | Method::Em);
         if !fits_grids || sizes == Sizes::UpperEdge {
             return Self::new(edges, threshold, method, sizes);
         }
         Self {
-            profile_edges: fitting_profile_edges(edges, profile_bins(edges), smallest, threshold),
-            size_edges: fitting_edges(edges, smallest, threshold),
+            profile_edges: fitting_profile_edges(edges, profile_bins(edges), smallest, threshold, top),
+            size_edges: fitting_edges(edges, smallest, threshold, top),
             error: None,
         }
     }
@@ -125,13 +127,14 @@ const SMALLEST: f64 = 1e-4;
 const TOP_SHARE: f64 = 0.01;
 
 impl ParticleTypes {
-    /// [`UnfoldingBins::for_profiles`] with the highest profile bin wide enough that every type has profiles in it.
+    /// [`UnfoldingBins::for_profiles`] with the highest profile bin up to the last edge wide enough that every type has
+    /// profiles in it.
     ///
     /// ```
     /// use stereology::{kmatrix::Sizes, pipeline::ParticleTypes, unfold::Method};
     /// let edges = [0.0, 0.5, 1.0];
     /// let top = |shape: &str| {
-    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.1, 0.0, Method::Auto, Sizes::Integrated);
+    ///     let bins = ParticleTypes::parse(&[shape])?.unfolding_bins(&edges, 0.1, 0.0, 1.0, Method::Auto, Sizes::Integrated);
     ///     Ok::<_, stereology::pipeline::ParticleTypesError>(bins.profile_edges[bins.profile_edges.len() - 2])
     /// };
     /// assert_eq!(top("sphere")?, 0.99);
@@ -144,10 +147,11 @@ impl ParticleTypes {
         edges: &[f64],
         smallest: f64,
         threshold: f64,
+        top: f64,
         method: Method,
         sizes: Sizes,
     ) -> UnfoldingBins {
-        let mut bins = UnfoldingBins::for_profiles(edges, smallest, threshold, method, sizes);
+        let mut bins = UnfoldingBins::for_profiles(edges, smallest, threshold, top, method, sizes);
         let (Some(&largest), false) = (edges.last(), method == Method::Paper) else {
             return bins;
         };
@@ -155,7 +159,9 @@ impl ParticleTypes {
             let shares = self.types().iter().map(|of| 1.0 - of.law().cdf(edge / largest));
             shares.fold(1.0, f64::min) >= TOP_SHARE
         };
-        let inner = bins.profile_edges.len() - 1;
+        let inner = bins
+            .profile_edges
+            .partition_point(|&edge| edge < largest * (1.0 - 1e-12));
         let kept = (1..inner).rev().find(|&k| shown(bins.profile_edges[k])).unwrap_or(0);
         bins.profile_edges.drain(kept + 1..inner);
         bins

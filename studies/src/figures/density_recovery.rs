@@ -61,8 +61,9 @@ fn experiment(index: usize) -> Result<Experiment> {
         .map(|(_, area)| (4.0 * area / PI).sqrt())
         .collect();
     let edges = equal_edges(1.0, BINS);
+    let smallest = sizes.iter().copied().fold(1.0, f64::min);
     let estimate = |method: Method, spread: Sizes| -> Result<Unfolding> {
-        let bins = UnfoldingBins::new(&edges, 0.0, method, spread);
+        let bins = UnfoldingBins::for_profiles(&edges, smallest, 0.0, 1.0, method, spread);
         let counts = ProfileCounts::from_sizes(&sizes, None, &bins.profile_edges, AREA)?;
         let kernel = types
             .kernel(&bins.profile_edges, &bins.size_edges, spread)?

@@ -19,6 +19,8 @@ use super::sphere_samples::{AREA, BAND_ON_MODE, Diameters, FEW, FIGURE_7, Popula
 
 const BINS: usize = 10;
 const SEEDS: u64 = 200;
+/// Size of the smallest of so many profiles, about.
+const SMALLEST: f64 = 0.02;
 
 /// An estimator and its bins.
 struct Estimator {
@@ -32,7 +34,7 @@ struct Estimator {
 impl Estimator {
     fn new(name: &'static str, method: Method, sizes: Sizes, profile_bins: Option<usize>) -> Result<Self> {
         let edges = equal_edges(1.0, BINS);
-        let mut bins = UnfoldingBins::new(&edges, 0.0, method, sizes);
+        let mut bins = UnfoldingBins::for_profiles(&edges, SMALLEST, 0.0, 1.0, method, sizes);
         if let Some(profile_bins) = profile_bins {
             bins.profile_edges = equal_edges(1.0, profile_bins);
         }

@@ -14,4 +14,5 @@ mod incomplete;
 mod intervals;
 mod misfit;
 mod round_trips;
+mod size_laws;
 mod spheres;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
-use stereology_unfold::{Kernel, SizeBins, divided_edges};
+use stereology_unfold::{Kernel, SizeBins, divided_edges, fitting_edges, fitting_profile_edges};
 
 /// D F(d / D): length of offsets at which a sphere of diameter D shows a profile up to d.
 fn below(d: f64, diameter: f64) -> f64 {
@@ -54,4 +54,11 @@ pub(crate) fn fine(size_edges: &[f64]) -> (Kernel, Vec<f64>) {
             .unwrap(),
         profile_edges,
     )
+}
+
+/// Kernel and profile edges from which all internal grids can be made, for profiles down to `smallest`.
+pub(crate) fn on_grids(size_edges: &[f64], smallest: f64) -> (Kernel, Vec<f64>) {
+    let profile_edges = fitting_profile_edges(size_edges, 100, smallest, 0.0, 0.0);
+    let kernel = integrated(&profile_edges, &fitting_edges(size_edges, smallest, 0.0, 0.0));
+    (kernel.reported_in(size_edges).unwrap(), profile_edges)
 }

@@ -64,7 +64,9 @@ impl Replicates {
         let values: Vec<(f64, f64)> = replicates
             .map(|(densities, &base)| (bases[base], quantity(densities) - bases[base]))
             .collect();
+        // Resampled slices and tiles scatter too much for the mean of a logarithm to be the logarithm of the mean.
         if deviation == Deviation::Ratio
+            && self.slices.is_none()
             && value > 0.0
             && values.iter().all(|(base, error)| *base > 0.0 && base + error > 0.0)
         {

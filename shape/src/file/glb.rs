@@ -190,8 +190,8 @@ impl Glb {
     ///
     /// # Errors
     ///
-    /// If a coordinate is not finite or too large for single precision, a normal is not finite, the mesh takes more than
-    /// 4 GB, or `out` fails.
+    /// If a coordinate is not finite or too large for single precision, a normal is not finite, the mesh takes more
+    /// than 4 GB, or `out` fails.
     pub(crate) fn write(mut self, out: &mut impl Write, mesh: &TriangleMesh, corners: &Corners) -> io::Result<()> {
         let bounds = bounds(mesh);
         let centre = nalgebra::center(&bounds[0], &bounds[1]);

@@ -12,14 +12,14 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Save the photograph without transparency if this is not intended.",
     ),
     (
-        "area-fraction",
-        "Profiles cover less than 1 % or more than 70 % of the photograph.",
-        "Look at overlay.png; give the colour of the binder with --binder, or import a label map with --labels FILE.",
-    ),
-    (
         "area-and-size-disagree",
         "The sizes of the profiles contradict their areas or bounding boxes: other units, radii, Feret diameters, or areas in the column of sizes.",
         "Correct the table: `size` is the diameter of the circle with the profile's area, in the unit of all other lengths.",
+    ),
+    (
+        "area-fraction",
+        "Profiles cover less than 1 % or more than 70 % of the photograph.",
+        "Look at overlay.png; give the colour of the binder with --binder, or import a label map with --labels FILE.",
     ),
     (
         "beyond-heeger-bergen",

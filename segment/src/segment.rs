@@ -17,11 +17,12 @@ use crate::working_scale::{WorkingScale, spread_of};
 
 /// Finds the profiles of particles in a photo of a section.
 ///
-/// The steps, each a public function: [`encoded_image`] and [`gaussian_filter_rgb`];
-/// [`BinderModel`](crate::BinderModel), whose colour and light are fitted robustly; [`hysteresis`](crate::hysteresis)
-/// of the distance to it, [`fill_holes`](crate::fill_holes), [`open`](crate::open);
-/// [`half_contrast`](crate::half_contrast); [`split_by_colour`], [`split_by_shape`](crate::split_by_shape); small
-/// profiles removed, profiles at the edges weighted, colours grouped into categories.
+/// The steps, each a public function: [`encoded_image`] and
+/// [`gaussian_filter_rgb`](stereology_imaging::gaussian_filter_rgb); [`BinderModel`](crate::BinderModel), whose colour
+/// and light are fitted robustly; [`hysteresis`](crate::hysteresis) of the distance to it,
+/// [`fill_holes`](crate::fill_holes), [`open`](crate::open); [`half_contrast`](crate::half_contrast);
+/// [`split_by_colour`](crate::split_by_colour), [`split_by_shape`](crate::split_by_shape); small profiles removed,
+/// profiles at the edges weighted, colours grouped into categories.
 ///
 /// # Errors
 ///

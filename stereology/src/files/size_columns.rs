@@ -24,7 +24,7 @@ const FILLED: (f64, f64) = (0.25, 1.02);
 /// use stereology::files::{profiles, size_columns};
 ///
 /// let table = std::env::temp_dir().join(format!("radii-{}.csv", std::process::id()));
-/// std::fs::write(&table, "size,area\n1,12.566\n2,50.265\n3,113.1\n")?;
+/// std::fs::write(&table, "size,area\n1,3.1416\n2,12.566\n3,28.274\n")?;
 /// let found = size_columns::findings(&profiles::read(&table)?.rows);
 /// assert!(found[0].code == "area-and-size-disagree" && found[0].message.contains("radii"));
 /// # std::fs::remove_file(table)?;

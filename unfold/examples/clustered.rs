@@ -12,15 +12,16 @@
     reason = "a study prints its table; counts are far below 2^53"
 )]
 
+#[path = "common/spheres.rs"]
+mod spheres;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
+use spheres::spheres;
 use std::error::Error;
 use std::f64::consts::PI;
-use stereology_unfold::{
-    Bootstrap, Kernel, ProfileCounts, Resampling, SizeBins, Tiling, UnfoldOptions, Unfolding, capped_kernel,
-    clustering, equal_edges, fitting_edges, fitting_profile_edges, unfold,
-};
+use stereology_unfold::{Bootstrap, ProfileCounts, Resampling, Tiling, UnfoldOptions, Unfolding, clustering, unfold};
 
 /// Spread of the logarithms of the sizes.
 const SIGMA: f64 = 0.3;
@@ -160,18 +161,6 @@ fn ball(rng: &mut ChaCha8Rng) -> [f64; 3] {
     }
 }
 
-/// Profile bins and the kernel of spheres for them.
-fn spheres(sizes: &[f64]) -> Result<(Vec<f64>, Kernel), Box<dyn Error>> {
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let smallest = sizes.iter().copied().fold(largest, f64::min);
-    let edges = equal_edges(largest, 10);
-    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0, 0.0))?.reported_in(&edges)?;
-    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0, 0.0);
-    let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
-    let kernel = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?;
-    Ok((profile_edges, kernel))
-}
-
 fn options(resampling: Resampling, seed: u64) -> UnfoldOptions {
     UnfoldOptions::default().with_bootstrap(Bootstrap {
         seed,
@@ -192,7 +181,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut rng = ChaCha8Rng::seed_from_u64(repeat);
             let (points, sizes) = design.profiles(&mut rng);
             numbers.push(sizes.len() as f64);
-            let (edges, kernel) = spheres(&sizes)?;
+            let (edges, kernel) = spheres(&sizes, None)?;
             let found = clustering(&points, &sizes).filter(|of| of.p_value < 0.1);
             used += u32::from(found.is_some());
             reported += u32::from(found.is_some_and(|of| of.p_value < 0.01));

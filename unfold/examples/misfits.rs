@@ -12,15 +12,18 @@
     reason = "a study prints its table; counts are far below 2^53"
 )]
 
-use rand::{RngExt, SeedableRng};
+#[path = "common/laws.rs"]
+mod laws;
+#[path = "common/spheres.rs"]
+mod spheres;
+
+use laws::Law;
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Gamma, Poisson, StandardNormal, Weibull};
+use spheres::spheres;
 use std::error::Error;
 use std::f64::consts::PI;
-use stereology_unfold::{
-    ProfileCounts, SizeBins, UnfoldOptions, capped_kernel, equal_edges, fitting_edges, fitting_profile_edges,
-    profile_findings, unfold,
-};
+use stereology_unfold::{ProfileCounts, UnfoldOptions, profile_findings, unfold};
 
 const LAWS: [&str; 8] = [
     "lognormal.3",
@@ -29,7 +32,7 @@ const LAWS: [&str; 8] = [
     "gamma2",
     "weibull1.5",
     "trimodal",
-    "uniform",
+    "constant",
     "fines",
 ];
 
@@ -131,70 +134,9 @@ fn covered(sizes: &[f64]) -> f64 {
     sizes.iter().map(|size| 0.25 * PI * size * size).sum()
 }
 
-/// One size of a distribution.
-fn size(law: &str, rng: &mut ChaCha8Rng) -> f64 {
-    let normal: f64 = StandardNormal.sample(rng);
-    let uniform: f64 = rng.random();
-    match law {
-        "lognormal.5" => (0.5 * normal).exp(),
-        "lognormal.8" => (0.8 * normal).exp(),
-        "gamma2" => Gamma::new(2.0, 0.5).map_or(1.0, |law| law.sample(rng)),
-        "weibull1.5" => Weibull::new(1.0, 1.5).map_or(1.0, |law| law.sample(rng)),
-        "trimodal" => {
-            [0.3, 0.3, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6, 1.0, 1.0][(10.0 * uniform) as usize] * (1.0 + 0.05 * normal)
-        }
-        "uniform" => uniform,
-        "fines" if uniform < 0.7 => 0.1 * (0.3 * normal).exp(),
-        "fines" => (0.2 * normal).exp(),
-        _ => (0.3 * normal).exp(),
-    }
-}
-
-/// A distribution: sizes drawn from it, and their running sum.
-struct Law {
-    drawn: Vec<f64>,
-    running: Vec<f64>,
-}
-
-impl Law {
-    fn new(name: &str) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let drawn: Vec<f64> = (0..1_000_000).map(|_| size(name, &mut rng)).collect();
-        let running = drawn.iter().scan(0.0, |sum, size| {
-            *sum += size;
-            Some(*sum)
-        });
-        Self {
-            running: running.collect(),
-            drawn,
-        }
-    }
-
-    /// A Poisson number of profiles, and an area that they cover to 40 % on average.
-    fn profiles(&self, expected: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, f64) {
-        let count = Poisson::new(expected).map_or(0.0, |law| law.sample(rng)) as usize;
-        let whole = self.running[self.running.len() - 1];
-        let profiles = (0..count).map(|_| {
-            let share = whole * rng.random::<f64>();
-            let at = self.running.partition_point(|&sum| sum < share);
-            let depth: f64 = rng.random();
-            self.drawn[at] * (1.0 - depth * depth).sqrt()
-        });
-        let cubes: f64 = self.drawn.iter().map(|size| size.powi(3)).sum();
-        // Mean area of a profile: (2/3) π/4 <D³>/<D>.
-        (profiles.collect(), expected * PI / 6.0 * cubes / whole / 0.4)
-    }
-}
-
 /// Codes of all warnings of a fit of spheres.
 fn codes(sizes: &[f64], area: f64) -> Result<Vec<&'static str>, Box<dyn Error>> {
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let smallest = sizes.iter().copied().fold(largest, f64::min);
-    let edges = equal_edges(largest, 10);
-    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0, 0.0))?.reported_in(&edges)?;
-    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0, 0.0);
-    let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
-    let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?;
+    let (profile_edges, spheres) = spheres(sizes, None)?;
     let counts = ProfileCounts::from_sizes(sizes, None, &profile_edges, area)?;
     let found = unfold(&counts, &spheres, &UnfoldOptions::default())?;
     let findings = found.findings.into_iter().chain(profile_findings(sizes, None, area));
@@ -223,7 +165,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             for repeat in 0..repeats {
                 let mut rng = ChaCha8Rng::seed_from_u64(31 + 1000 * repeat);
                 rng.set_stream(expected as u64);
-                let (sizes, area) = law.profiles(expected, &mut rng);
+                let sizes = law.profiles(expected, &mut rng);
+                // Profiles, of mean area (2/3) π/4 <D³>/<D>, cover 40 % of it on average.
+                let area = expected * PI / 6.0 * law.cube / law.mean / 0.4;
                 for (raised, (_, alter, concerning)) in raised.iter_mut().zip(&ALTERATIONS) {
                     let (mut sizes, mut area) = (sizes.clone(), area);
                     alter(&mut sizes, &mut area);

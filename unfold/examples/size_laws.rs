@@ -14,15 +14,20 @@
     reason = "a study prints its table; counts are far below 2^53"
 )]
 
-use rand::{RngExt, SeedableRng};
+#[path = "common/laws.rs"]
+mod laws;
+#[path = "common/spheres.rs"]
+mod spheres;
+
+use laws::Law;
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Gamma, Poisson, StandardNormal, Weibull};
+use spheres::spheres;
 use std::error::Error;
 use std::f64::consts::PI;
 use std::time::Instant;
 use stereology_unfold::{
-    Bootstrap, Estimate, Method, ProfileCounts, SizeBins, UnfoldOptions, Unfolding, capped_kernel, equal_edges,
-    fitting_edges, fitting_profile_edges, profile_findings, smallest_size, unfold,
+    Bootstrap, Estimate, Method, ProfileCounts, UnfoldOptions, Unfolding, profile_findings, unfold,
 };
 
 const LAWS: [&str; 18] = [
@@ -46,124 +51,14 @@ const LAWS: [&str; 18] = [
     "band+mode",
 ];
 
-/// One size of a distribution.
-fn size(law: &str, rng: &mut ChaCha8Rng) -> f64 {
-    let normal: f64 = StandardNormal.sample(rng);
-    let uniform: f64 = rng.random();
-    let gamma = |shape: f64, rng: &mut ChaCha8Rng| Gamma::new(shape, 1.0 / shape).map_or(1.0, |law| law.sample(rng));
-    match law {
-        "lognormal.3" => (0.3 * normal).exp(),
-        "lognormal.5" => (0.5 * normal).exp(),
-        "lognormal.8" => (0.8 * normal).exp(),
-        "lognormal1" => normal.exp(),
-        "gamma1.5" => gamma(1.5, rng),
-        "gamma2" => gamma(2.0, rng),
-        "weibull1.5" => Weibull::new(1.0, 1.5).map_or(1.0, |law| law.sample(rng)),
-        // Density as D^-2.5 from 0.1 to 1.
-        "power" => (0.1_f64.powf(-1.5) + uniform * (1.0 - 0.1_f64.powf(-1.5))).powf(-1.0 / 1.5),
-        "trimodal" => {
-            let middle = if uniform < 0.5 {
-                0.3
-            } else if uniform < 0.8 {
-                0.6
-            } else {
-                1.0
-            };
-            middle * (1.0 + 0.05 * normal)
-        }
-        "spike+tail" => {
-            if uniform < 0.6 {
-                0.5 * (1.0 + 0.02 * normal)
-            } else {
-                0.5 * (0.4 * normal).exp()
-            }
-        }
-        "fines" => {
-            if uniform < 0.7 {
-                0.1 * (0.3 * normal).exp()
-            } else {
-                (0.2 * normal).exp()
-            }
-        }
-        // Those of figure 7, and a narrow band on a broad mode.
-        "constant" => uniform,
-        "single" => within(0.55 + 0.15 * normal, rng, law),
-        "bimodal" => within(if uniform < 0.5 { 0.3 } else { 0.75 } + 0.08 * normal, rng, law),
-        "lognormal.45" => within(0.3 * (0.45 * normal).exp(), rng, law),
-        "two bands" => 0.1 * (uniform + if rng.random::<f64>() < 0.5 { 3.0 } else { 7.0 }),
-        "band+mode" if uniform < 0.3 => 0.7 + 0.05 * rng.random::<f64>(),
-        "band+mode" => within(0.5 + 0.15 * normal, rng, law),
-        _ => 0.5,
-    }
-}
-
-/// The size if it lies in (0, 1], else another one.
-fn within(drawn: f64, rng: &mut ChaCha8Rng, law: &str) -> f64 {
-    if drawn > 0.0 && drawn <= 1.0 {
-        drawn
-    } else {
-        size(law, rng)
-    }
-}
-
-/// A distribution, its moments, and a table of sizes drawn in proportion to the size.
-struct Law {
-    name: &'static str,
-    mean: f64,
-    cube: f64,
-    /// Sizes, and their running sum.
-    drawn: Vec<f64>,
-    running: Vec<f64>,
-    sorted: Vec<f64>,
-}
-
-impl Law {
-    fn new(name: &'static str) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let drawn: Vec<f64> = (0..2_000_000).map(|_| size(name, &mut rng)).collect();
-        let mut sum = 0.0;
-        let running: Vec<f64> = drawn
-            .iter()
-            .map(|d| {
-                sum += d;
-                sum
-            })
-            .collect();
-        let count = drawn.len() as f64;
-        let mut sorted = drawn.clone();
-        sorted.sort_by(f64::total_cmp);
-        Self {
-            name,
-            mean: sum / count,
-            cube: drawn.iter().map(|d| d.powi(3)).sum::<f64>() / count,
-            sorted,
-            drawn,
-            running,
-        }
-    }
-
-    /// A Poisson number of profiles of one sphere per unit volume, and the area they lie on.
-    fn profiles(&self, expected: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, f64) {
-        let count = Poisson::new(expected).map_or(0.0, |law| law.sample(rng)) as usize;
-        let whole = self.running[self.running.len() - 1];
-        let profiles = (0..count).map(|_| {
-            let share = whole * rng.random::<f64>();
-            let at = self.running.partition_point(|&sum| sum < share);
-            let depth: f64 = rng.random();
-            self.drawn[at] * (1.0 - depth * depth).sqrt()
-        });
-        (profiles.collect(), expected / self.mean)
-    }
-
-    /// Fractions of the particles in bins; the last holds larger ones too.
-    fn fractions(&self, edges: &[f64]) -> Vec<f64> {
-        let below = |size: f64| self.sorted.partition_point(|&of| of <= size) as f64;
-        let last = edges.len() - 1;
-        let upper = |k: usize| if k == last { f64::INFINITY } else { edges[k] };
-        (0..last)
-            .map(|k| (below(upper(k + 1)) - below(edges[k])) / self.sorted.len() as f64)
-            .collect()
-    }
+/// Fractions of sorted sizes in bins; the last holds larger ones too.
+fn fractions(sorted: &[f64], edges: &[f64]) -> Vec<f64> {
+    let below = |size: f64| sorted.partition_point(|&of| of <= size) as f64;
+    let last = edges.len() - 1;
+    let upper = |k: usize| if k == last { f64::INFINITY } else { edges[k] };
+    (0..last)
+        .map(|k| (below(upper(k + 1)) - below(edges[k])) / sorted.len() as f64)
+        .collect()
 }
 
 /// How samples are fitted.
@@ -175,15 +70,7 @@ struct Fitting {
 }
 
 fn fit(profiles: &[f64], area: f64, seed: u64, of: Fitting) -> Result<Unfolding, Box<dyn Error>> {
-    let observed = profiles.iter().copied().fold(0.0, f64::max);
-    let largest = of.largest.unwrap_or(observed);
-    let edges = equal_edges(largest, 10);
-    let smallest = smallest_size(profiles);
-    let top = of.largest.unwrap_or(1.5 * largest);
-    let bins = SizeBins::integrated(&fitting_edges(&edges, smallest, 0.0, top))?.reported_in(&edges)?;
-    let profile_edges = fitting_profile_edges(&edges, 100, smallest, 0.0, top);
-    let law = |x: f64| 1.0 - (1.0 - x.min(1.0).powi(2)).sqrt();
-    let spheres = capped_kernel(&law, 1.0, 0.0, &profile_edges, bins, PI / 6.0)?.with_profile_law(law);
+    let (profile_edges, spheres) = spheres(profiles, of.largest)?;
     let counts = ProfileCounts::from_sizes(profiles, None, &profile_edges, area)?;
     let mut options = UnfoldOptions::default().with_method(of.method);
     if of.replicates > 0 {
@@ -258,6 +145,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             continue;
         }
         let law = Law::new(name);
+        let mut sorted = law.drawn.clone();
+        sorted.sort_by(f64::total_cmp);
         for expected in profiles.split(',') {
             let expected: f64 = expected.parse()?;
             let (mut total, mut mean, mut volume) = (Tally::default(), Tally::default(), Tally::default());
@@ -266,7 +155,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             for repeat in 0..repeats {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * repeat);
                 rng.set_stream(expected as u64);
-                let (sizes, area) = law.profiles(expected, &mut rng);
+                let sizes = law.profiles(expected, &mut rng);
+                // One sphere per unit volume.
+                let area = expected / law.mean;
                 let start = Instant::now();
                 let found = fit(&sizes, area, repeat, how)?;
                 seconds += start.elapsed().as_secs_f64();
@@ -286,7 +177,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let data = profile_findings(&sizes, None, f64::MAX);
                 alarms += usize::from(found.findings.iter().chain(&data).any(|of| wrong.contains(&of.code)));
                 sparse += usize::from(found.method.name() == "sparse");
-                let truth = law.fractions(&found.edges);
+                let truth = fractions(&sorted, &found.edges);
                 for (density, truth) in found.number_density.iter().zip(&truth) {
                     distance += (density.unwrap_or(0.0) / found.total.value - truth).abs();
                 }
@@ -301,7 +192,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             println!(
                 "{:13} {:8} | {} | {} | {} | {:+6.1} | {:.2} {:.4} {:.4} {sparse:3}/{repeats:3} {alarms:3} {:.1}",
-                law.name,
+                name,
                 expected,
                 total.show(),
                 mean.show(),

@@ -151,7 +151,9 @@ impl Parts {
             let part = &self.counts[rng.random_range(0..self.counts.len())];
             sum.iter_mut().zip(part).for_each(|(sum, count)| *sum += count);
         }
-        if let Ok(law) = Gamma::new(1.0 / self.common_variance, self.common_variance) {
+        if self.common_variance > 0.0
+            && let Ok(law) = Gamma::new(1.0 / self.common_variance, self.common_variance)
+        {
             let factor = law.sample(rng);
             sum.iter_mut().for_each(|count| *count *= factor);
         }

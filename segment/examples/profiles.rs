@@ -6,15 +6,19 @@
 
 use std::{error::Error, ops::ControlFlow, path::PathBuf};
 
-use stereology_segment::{SegmentOptions, read_photo, segment, write_labels};
+use stereology_segment::{SegmentOptions, read_photo_up_to, segment, write_labels};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args_os().skip(1);
-    let photo = match arguments.next() {
-        Some(path) => read_photo(path)?,
-        None => drawn(),
+    let (photo, compression) = match arguments.next() {
+        Some(path) => {
+            let read = read_photo_up_to(path, u64::MAX)?;
+            (read.photo, read.compression)
+        }
+        None => (drawn(), None),
     };
-    let segmentation = segment(&photo, &SegmentOptions::default(), &|_| ControlFlow::Continue(()))?;
+    let options = SegmentOptions::default().with_compression(compression);
+    let segmentation = segment(&photo, &options, &|_| ControlFlow::Continue(()))?;
     let n = segmentation.profiles.len();
     let mean = segmentation.profiles.iter().map(|p| p.size).sum::<f64>() / n as f64;
     println!(

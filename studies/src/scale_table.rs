@@ -34,9 +34,11 @@ struct Kind {
     binder: [f64; 3],
     blur: f32,
     noise: f64,
+    /// Standard deviation of a texture of lightness, of flecks some pixels wide.
+    texture: f64,
 }
 
-const KINDS: [Kind; 4] = [
+const KINDS: [Kind; 5] = [
     Kind {
         name: "ellipses of four colours, sharp",
         corners: false,
@@ -52,6 +54,7 @@ const KINDS: [Kind; 4] = [
         binder: [226.0, 222.0, 214.0],
         blur: 0.6,
         noise: 2.0,
+        texture: 0.0,
     },
     Kind {
         name: "three colours, touching",
@@ -63,6 +66,7 @@ const KINDS: [Kind; 4] = [
         binder: [225.0, 222.0, 215.0],
         blur: 0.7,
         noise: 2.0,
+        texture: 0.0,
     },
     Kind {
         name: "sections of cubes, blurred",
@@ -74,6 +78,7 @@ const KINDS: [Kind; 4] = [
         binder: [205.0, 200.0, 190.0],
         blur: 1.5,
         noise: 2.0,
+        texture: 0.0,
     },
     Kind {
         name: "grey ellipses without noise",
@@ -85,8 +90,28 @@ const KINDS: [Kind; 4] = [
         binder: [200.0; 3],
         blur: 1.0,
         noise: 0.0,
+        texture: 0.0,
+    },
+    Kind {
+        name: "pale ellipses, binder with texture",
+        corners: false,
+        gap: 3.0,
+        number: 130,
+        radius: 13.0,
+        colours: &[
+            [175.0, 120.0, 85.0],
+            [90.0, 105.0, 90.0],
+            [205.0, 190.0, 150.0],
+            [70.0, 60.0, 85.0],
+        ],
+        binder: [158.0, 152.0, 146.0],
+        blur: 0.7,
+        noise: 1.0,
+        texture: 5.0,
     },
 ];
+/// Standard deviation of the blur of a texture, pixels.
+const FLECKS: f32 = 1.5;
 
 /// Counts the profiles of all versions of all test images and writes the table between the marks of `page`.
 pub fn run(page: &Path) -> Result<()> {
@@ -202,12 +227,32 @@ impl Kind {
             Rgb(inside.map_or(self.binder, |f| f.colour).map(|c| c as u8))
         });
         let pixels = resize(&blur(&sharp, 2.0 * self.blur), width, height, FilterType::Triangle);
+        let flecks = self.flecks(&mut rng);
         let mut noise = || self.noise * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
-        let noisy = pixels
-            .pixels()
-            .map(|p| p.0.map(|c| (f64::from(c) + noise()).round().clamp(0.0, 255.0) as u8));
+        let noisy = pixels.pixels().zip(flecks).map(|(p, fleck)| {
+            p.0.map(|c| {
+                (f64::from(c) * (1.0 + fleck / 255.0) + noise())
+                    .round()
+                    .clamp(0.0, 255.0) as u8
+            })
+        });
         let values: Vec<u8> = noisy.flatten().collect();
         RgbImage::from_raw(width, height, values).unwrap_or(pixels)
+    }
+
+    /// The texture of every pixel, row by row: blurred noise.
+    fn flecks(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let [width, height] = SIZE;
+        if self.texture == 0.0 {
+            return vec![0.0; (width * height) as usize];
+        }
+        // Blurred independent values keep 1 / (4π σ²) of their variance; levels have a standard deviation of 48.
+        let kept = 1.0 / (4.0 * std::f64::consts::PI * f64::from(FLECKS).powi(2)).sqrt();
+        let mut level = || (128.0 + 48.0 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, rng)) as u8;
+        let noise = image::GrayImage::from_fn(width, height, |_, _| image::Luma([level()]));
+        let blurred = blur(&noise, FLECKS);
+        let size = self.texture / (48.0 * kept);
+        blurred.pixels().map(|p| (f64::from(p.0[0]) - 127.5) * size).collect()
     }
 
     /// Figures that keep their distance, as many as find a place.

@@ -1,5 +1,7 @@
 //! What JPEG compression has done to a photograph's colours, from the tables in its file.
 
+use std::f64::consts::PI;
+
 /// Errors of the colours of a photograph that was stored as a JPEG.
 ///
 /// JPEG rounds the cosine coefficients of blocks of 8 x 8 samples of lightness (Y) and hue (Cb, Cr) to multiples of the
@@ -24,10 +26,10 @@ pub struct Compression {
     pub subsampling: [u8; 2],
 }
 
-/// Lowest coefficients, in the order in which tables are stored.
-const LOWEST: usize = 6;
-/// Pixels in a block.
-const BLOCK: f64 = 64.0;
+/// Orders (u, v) of the lowest coefficients, in the order in which tables are stored.
+const LOWEST_ORDERS: [[u8; 2]; 6] = [[0, 0], [1, 0], [0, 1], [0, 2], [1, 1], [2, 0]];
+/// Side of a block, samples.
+const SIDE: f64 = 8.0;
 /// Markers of segments, and those of frames: C0 to CF but for C4, C8 and CC.
 const TABLES: u8 = 0xdb;
 const SCAN: u8 = 0xda;
@@ -91,16 +93,24 @@ impl Compression {
         })
     }
 
-    /// Covariance of the errors of encoded R, G, B, values from 0 to 1.
-    pub(crate) fn covariance(&self) -> [[f64; 3]; 3] {
+    /// Covariance of the errors of encoded R, G, B, values from 0 to 1, that remain in averages over a Gaussian of
+    /// `sigma` pixels.
+    ///
+    /// The coefficient (u, v) of a block of B pixels is a cosine of wavelengths 2B / u and 2B / v there and independent
+    /// of those of other blocks. Averages keep this fraction of its variance, up to the shape of the block:
+    ///
+    /// ```text
+    /// exp(−(π σ / B)² (u² + v²)) / (1 + 4π σ² / B²)
+    /// ```
+    pub(crate) fn covariance(&self, sigma: f64) -> [[f64; 3]; 3] {
         // R = Y + 1.402 Cr, G = Y − 0.344 Cb − 0.714 Cr, B = Y + 1.772 Cb (JFIF).
         let colours = [[1.0, 0.0, 1.402], [1.0, -0.344, -0.714], [1.0, 1.772, 0.0]];
+        let samples = f64::from(self.subsampling[0].max(self.subsampling[1]));
+        let [lightness, hue] = [1.0, samples].map(|pixels| remaining(sigma / (SIDE * pixels)));
+        let variances: [f64; 3] =
+            std::array::from_fn(|k| self.errors[k].powi(2) * if k == 0 { lightness } else { hue });
         std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                (0..3)
-                    .map(|k| colours[i][k] * colours[j][k] * self.errors[k].powi(2))
-                    .sum()
-            })
+            std::array::from_fn(|j| (0..3).map(|k| colours[i][k] * colours[j][k] * variances[k]).sum())
         })
     }
 
@@ -112,16 +122,24 @@ impl Compression {
     }
 }
 
+/// Mean over the lowest coefficients of the fraction of their variance that remains in averages over a Gaussian of
+/// `sigma` blocks.
+fn remaining(sigma: f64) -> f64 {
+    let falling = (PI * sigma).powi(2);
+    let shares = LOWEST_ORDERS.map(|[u, v]| (-falling * f64::from(u * u + v * v)).exp());
+    shares.iter().sum::<f64>() / shares.len() as f64 / (1.0 + 4.0 * PI * sigma * sigma)
+}
+
 /// Reads the tables of a segment: the standard deviation that the lowest steps of each give.
 fn read_tables(mut segment: &[u8], steps: &mut [Option<f64>; 4]) -> Option<()> {
     while let Some((&kind, rest)) = segment.split_first() {
         let bytes = if kind >> 4 == 0 { 1 } else { 2 };
         let table = rest.get(..64 * bytes)?;
-        let squares = table.chunks_exact(bytes).take(LOWEST).map(|step| {
+        let squares = table.chunks_exact(bytes).take(LOWEST_ORDERS.len()).map(|step| {
             let step = step.iter().fold(0.0, |value, byte| 256.0 * value + f64::from(*byte));
             (step / 255.0).powi(2)
         });
-        *steps.get_mut(usize::from(kind & 15))? = Some((squares.sum::<f64>() / (12.0 * BLOCK)).sqrt());
+        *steps.get_mut(usize::from(kind & 15))? = Some((squares.sum::<f64>() / (12.0 * SIDE * SIDE)).sqrt());
         segment = rest.get(64 * bytes..)?;
     }
     Some(())

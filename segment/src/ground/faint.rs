@@ -3,6 +3,7 @@
 use ndarray::Array2;
 use stereology_imaging::{connected_components, gaussian_filter, gaussian_filter_rgb};
 
+use crate::files::compression::Compression;
 use crate::ground::binder::{BinderModel, length};
 use crate::ground::enlarged::enlarged;
 use crate::outlines::half_contrast::half_contrast;
@@ -24,7 +25,8 @@ const GLOW: f64 = 0.3;
 ///
 /// The image is averaged over about six pixels, without those of the mask and its rim, so that neither texture nor the
 /// colours of particles already found hide faint ones. The binder's light and scatter are fitted again at that scale,
-/// and the thresholds are standard deviations there. A region that follows the mask over more than three tenths of its
+/// and the thresholds are standard deviations there, with what remains of the errors of compression: whole blocks of a
+/// JPEG have the hue of the step above or below. A region that follows the mask over more than three tenths of its
 /// outline is glow of a bright particle and is left out.
 ///
 /// # Complexity
@@ -46,7 +48,7 @@ const GLOW: f64 = 0.3;
 /// let image = encoded_image(&photo);
 /// let binder = BinderModel::fit(&image, 0);
 /// assert!(binder.distance(&image)[[60, 60]] < 5.0);
-/// let distance = faint_regions(&image, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0]);
+/// let distance = faint_regions(&image, &binder, &Array2::from_elem((120, 120), false), [5.0, 9.0], None);
 /// let found = distance.iter().filter(|z| **z > 0.0).count();
 /// assert!(distance[[60, 60]] > 9.0 && (1500..1700).contains(&found), "{found}");
 /// ```
@@ -56,12 +58,16 @@ pub fn faint_regions(
     binder: &BinderModel,
     mask: &Array2<bool>,
     [low, high]: [f32; 2],
+    compression: Option<Compression>,
 ) -> Array2<f32> {
     let dim = image.dim();
     let none = Array2::zeros(dim);
     let coarse = averaged(image, binder, mask);
     let known: Array2<[f32; 3]> = coarse.mapv(|c| c.unwrap_or([f32::NAN; 3]));
-    let model = binder.refit(&known);
+    let mut model = binder.refit(&known);
+    if let Some(compression) = compression {
+        model = model.with_errors(&compression.covariance(f64::from(SIGMA) * CELL as f64));
+    }
     let deviation = model
         .deviation(&known)
         .mapv(|d| if d[0].is_finite() { d } else { [0.0; 3] });
@@ -144,4 +150,46 @@ fn averaged(image: &Array2<[f32; 3]>, binder: &BinderModel, mask: &Array2<bool>)
         let light = binder.light(i * CELL, j * CELL);
         (weight >= KNOWN).then(|| std::array::from_fn(|c| light[c] + sums[[j, i]][c] / weight))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::faint_regions;
+    use crate::files::compression::Compression;
+    use crate::ground::binder::BinderModel;
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Blocks whose hue is stored one step beside that of the others are not faint particles if the size of the step is
+    /// known; and regions of ten steps remain.
+    #[test]
+    fn steps_of_hue_are_no_regions() {
+        // Of quality 40: 21 for hue, in coefficients that are eight times the mean over a block.
+        let step = 21.0 / 8.0 / 255.0;
+        let compression = Compression {
+            errors: [0.5, 1.0, 1.0].map(|steps| steps * step * (6.0_f64 / 12.0).sqrt()),
+            subsampling: [2, 2],
+        };
+        let mask = Array2::from_elem((256, 256), false);
+        let regions = |size: f32, compression| {
+            let mut rng = ChaCha8Rng::seed_from_u64(0);
+            let image = Array2::from_shape_fn((256, 256), |(y, x)| {
+                // One of 16 blocks of 16 x 16 pixels; Cb and Cr raised.
+                let hue = if (y / 16) % 4 == 1 && (x / 16) % 4 == 2 {
+                    size
+                } else {
+                    0.0
+                };
+                let texture = 0.02 * rng.random::<f32>();
+                [1.402, -1.058, 1.772].map(|c| 0.5 + texture + c * hue * step as f32)
+            });
+            let binder = BinderModel::fit(&image, 0);
+            let faint = faint_regions(&image, &binder, &mask, [3.5, 6.3], compression);
+            faint.iter().filter(|z| **z > 0.0).count()
+        };
+        assert!(regions(1.0, None) > 2000);
+        assert_eq!(regions(1.0, Some(compression)), 0);
+        assert!(regions(10.0, Some(compression)) > 2000);
+    }
 }

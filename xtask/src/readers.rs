@@ -9,9 +9,8 @@ use crate::workspace::root;
 
 /// The Python program that opens the files.
 const SCRIPT: &str = include_str!("readers.py");
-/// What it imports, and the packages that provide it.
+/// What it imports; the packages that provide it are in readers.txt.
 const MODULES: [&str; 8] = ["numpy", "h5py", "zarr", "tifffile", "nrrd", "vtk", "damask", "ovito"];
-const PACKAGES: [&str; 8] = ["numpy", "h5py", "zarr", "tifffile", "pynrrd", "vtk", "damask", "ovito"];
 
 /// Writes files of every format and checks them with readers that are not ours.
 ///
@@ -51,16 +50,22 @@ fn installed(environment: &Path) -> Result<PathBuf> {
         succeed(Command::new(&python).args(["-c", &import])).is_ok()
     };
     if !has_all() {
-        println!(
-            "readers: installing {} into {}",
-            PACKAGES.join(", "),
-            environment.display()
-        );
+        println!("readers: installing them into {}", environment.display());
         succeed(Command::new("python3").args(["-m", "venv"]).arg(environment))?;
         succeed(
             Command::new(&python)
-                .args(["-m", "pip", "install", "--quiet", "--retries", "1", "--timeout", "15"])
-                .args(PACKAGES),
+                .args([
+                    "-m",
+                    "pip",
+                    "install",
+                    "--quiet",
+                    "--retries",
+                    "1",
+                    "--timeout",
+                    "15",
+                    "-r",
+                ])
+                .arg(root()?.join("xtask/src/readers.txt")),
         )?;
         ensure!(has_all(), "they are installed and cannot be imported");
     }

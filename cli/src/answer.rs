@@ -110,7 +110,11 @@ impl Answer {
     }
 
     /// Prints the answer; the exit code is 0, or 3 if there are warnings and `--strict` is given.
-    pub fn print(&self, everywhere: &Everywhere) -> ExitCode {
+    ///
+    /// # Errors
+    ///
+    /// If standard output cannot be written.
+    pub fn print(&self, everywhere: &Everywhere) -> Result<ExitCode, Failure> {
         let Notes {
             text,
             warnings,
@@ -140,14 +144,23 @@ impl Answer {
                 }
             }
         }
-        let mut stdout = io::stdout().lock();
-        // A closed pipe (`| head`) is not an error of this program.
-        let _ = stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush());
-        ExitCode::from(if everywhere.strict && !warnings.is_empty() {
+        print(&out)?;
+        Ok(ExitCode::from(if everywhere.strict && !warnings.is_empty() {
             3
         } else {
             0
-        })
+        }))
+    }
+}
+
+/// Prints on standard output. A closed pipe (`| head`) is not an error of this program.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::run(format!(
+            "standard output: the answer cannot be written ({error})"
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -4,6 +4,7 @@ use clap::Args;
 use stereology::grid::LengthUnit;
 
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::values::PixelLength;
 
 /// Options of every command.
@@ -43,6 +44,9 @@ pub struct Everywhere {
     /// How the program was invoked.
     #[arg(skip)]
     pub invocation: Invocation,
+    /// The outputs of the command.
+    #[arg(skip)]
+    pub outputs: Outputs,
 }
 
 impl Everywhere {
@@ -82,9 +86,31 @@ pub struct Invocation {
     pub parameters: Vec<(String, String)>,
 }
 
+impl Everywhere {
+    /// Starts the threads of the computation.
+    pub fn start_threads(&self) -> Result<(), Failure> {
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(count) = self.threads {
+            pool = pool.num_threads(count);
+        } else if let Some(value) = std::env::var_os("RAYON_NUM_THREADS")
+            && let Some(count) = value.to_str().and_then(|text| text.parse::<usize>().ok())
+            && count > MOST_THREADS
+        {
+            return Err(Failure::usage(format!(
+                "the environment variable RAYON_NUM_THREADS={count}: at most {MOST_THREADS} threads are possible"
+            )));
+        }
+        pool.build_global()
+            .map_err(|error| Failure::run(format!("the threads cannot be started ({error}); give fewer --threads")))
+    }
+}
+
+/// Largest number of threads.
+const MOST_THREADS: usize = 1024;
+
 fn threads(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
-        Ok(n @ 1..=1024) => Ok(n),
-        _ => Err("a number of threads from 1 to 1024 is needed".to_owned()),
+        Ok(n @ 1..=MOST_THREADS) => Ok(n),
+        _ => Err(format!("a number of threads from 1 to {MOST_THREADS} is needed")),
     }
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use stereology::shape::{Body, BodyError};
 
+use crate::progress;
+
 /// Why a command failed, and the exit code of the program.
 #[derive(Debug)]
 pub struct Failure {
@@ -29,11 +31,19 @@ impl Failure {
         }
     }
 
-    /// Interrupted by Ctrl-C: exit 130, as shells expect.
+    /// Interrupted: exit 128 plus the number of the signal, 130 for Ctrl-C, as shells expect.
     pub fn stopped() -> Self {
         Self {
-            code: 130,
+            code: progress::code_of_signal(),
             message: "interrupted; no output was changed".to_owned(),
+        }
+    }
+
+    /// The same failure with another message.
+    pub fn reworded(self, reword: impl FnOnce(&str) -> String) -> Self {
+        Self {
+            message: reword(&self.message),
+            ..self
         }
     }
 

@@ -19,22 +19,32 @@ mod warnings;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches};
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
+use crate::answer::print;
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::program::{Command, Program, invocation};
 
 fn main() -> ExitCode {
-    let matches = Program::command().get_matches();
-    let program = Program::from_arg_matches(&matches).map(|mut program| {
-        program.everywhere.invocation = invocation(&matches);
-        program
-    });
-    let mut program = match program {
-        Ok(program) => program,
-        Err(error) => error.exit(),
+    let matches = match Program::command().try_get_matches() {
+        Ok(matches) => matches,
+        Err(error) => return explained(&error),
     };
-    match program.everywhere.settle().and_then(|()| run(&program)) {
+    let mut program = match Program::from_arg_matches(&matches) {
+        Ok(program) => program,
+        Err(error) => return explained(&error),
+    };
+    program.everywhere.invocation = invocation(&matches);
+    let done = program
+        .everywhere
+        .settle()
+        .and_then(|()| outputs_of(&matches, &program))
+        .and_then(|outputs| {
+            program.everywhere.outputs = outputs;
+            run(&program)
+        });
+    match done {
         Ok(code) => code,
         Err(failure) => {
             let failure = if progress::stopped() {
@@ -42,30 +52,48 @@ fn main() -> ExitCode {
             } else {
                 failure
             };
+            let failure = failure.reworded(|message| program.everywhere.outputs.with_final_names(message));
             let _ = writeln!(io::stderr(), "error: {failure}");
             ExitCode::from(failure.code())
         }
     }
 }
 
+/// Help, the version, or wrong usage. Help that cannot be printed is a failure.
+fn explained(error: &clap::Error) -> ExitCode {
+    let code = error.exit_code();
+    match error.print().and_then(|()| io::stdout().flush()) {
+        Err(lost) if lost.kind() != io::ErrorKind::BrokenPipe => ExitCode::FAILURE,
+        _ => ExitCode::from(u8::try_from(code).unwrap_or(1)),
+    }
+}
+
+/// The outputs that the command line names.
+fn outputs_of(matches: &ArgMatches, program: &Program) -> Result<Outputs, Failure> {
+    let Some((name, given)) = matches.subcommand() else {
+        return Ok(Outputs::default());
+    };
+    let mut all = Program::command();
+    all.build();
+    match all.find_subcommand(name) {
+        Some(command) => Outputs::of(command, given, program.everywhere.force),
+        None => Ok(Outputs::default()),
+    }
+}
+
 fn run(program: &Program) -> Result<ExitCode, Failure> {
     let everywhere = &program.everywhere;
-    progress::stop_on_ctrl_c();
-    if let Some(threads) = everywhere.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()
-            .map_err(|error| Failure::run(format!("--threads {threads}: the threads cannot be started ({error})")))?;
-    }
+    progress::stop_on_signals(everywhere.outputs.clone());
+    everywhere.start_threads()?;
     if matches!(program.command, Command::Manual) {
-        print!("{}", manual::page());
+        print(&manual::page())?;
         return Ok(ExitCode::SUCCESS);
     }
-    match program.command.run(everywhere)? {
-        Some(answer) => {
-            progress::go_on()?;
-            Ok(answer.print(everywhere))
-        }
+    let answer = program.command.run(everywhere)?;
+    progress::go_on()?;
+    everywhere.outputs.publish()?;
+    match answer {
+        Some(answer) => answer.print(everywhere),
         None => Ok(ExitCode::SUCCESS),
     }
 }

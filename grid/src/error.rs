@@ -19,9 +19,15 @@ pub enum GridError {
     /// The callback cancelled the work. Nothing is left on disk, except the partial volume of a resumable call.
     #[error("cancelled")]
     Cancelled,
-    /// The partial file is the beginning of another volume.
-    #[error("{}: is the beginning of another volume; remove it, or do not resume", partial.display())]
+    /// The partial file is not the beginning of this volume.
+    #[error("{}: is not the beginning of this volume; move it away, or do not resume", partial.display())]
     OtherPartial {
+        /// The partial file.
+        partial: PathBuf,
+    },
+    /// Another process is writing the partial file.
+    #[error("{}: another process is writing it; wait until it ends, or give another name", partial.display())]
+    InUse {
         /// The partial file.
         partial: PathBuf,
     },

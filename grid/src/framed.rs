@@ -1,9 +1,10 @@
 //! A file of raw samples between a head and a tail, written slab by slab and resumed after an interruption.
 
-use crate::atomic::{PartialFile, partial_name};
+use crate::atomic::PartialFile;
 use crate::element::Element;
 use crate::error::GridError;
 use crate::frame::Frame;
+use crate::names::partial_name;
 use crate::slabs::Slabs;
 use ndarray::ArrayViewMut3;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -37,7 +38,8 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
     file.publish()
 }
 
-/// Number of complete slabs in `FILE.partial`. Its head and its first and last complete slab must equal ours.
+/// Number of complete slabs in `FILE.partial`. What it holds must equal ours: its head, its first slab as far as it goes,
+/// and its last complete slab.
 fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
     path: &Path,
     file: &mut PartialFile,
@@ -47,12 +49,11 @@ fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<
 ) -> Result<usize, GridError> {
     let head = frame.head.len() as u64;
     let length = file.writer().get_ref().metadata().map_err(GridError::io(path))?.len();
-    if length < head + slab_bytes {
-        return Ok(0);
-    }
-    let whole = usize::try_from((length - head) / slab_bytes).unwrap_or(usize::MAX);
+    let whole = usize::try_from(length.saturating_sub(head) / slab_bytes).unwrap_or(usize::MAX);
     let done = whole.min(slabs.count());
     let mut is_there = |at: u64, ours: &[u8]| {
+        let stored = usize::try_from(length.saturating_sub(at)).unwrap_or(usize::MAX);
+        let ours = &ours[..ours.len().min(stored)];
         let mut theirs = vec![0; ours.len()];
         let from = file.writer().get_mut();
         from.seek(SeekFrom::Start(at))
@@ -65,10 +66,12 @@ fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<
         Err(GridError::OtherPartial { partial })
     };
     is_there(0, &frame.head)?;
-    for z in [0, done - 1] {
-        let mut ours = Vec::new();
-        T::write(slabs.at(z)?, &mut ours).map_err(GridError::io(path))?;
-        is_there(head + z as u64 * slab_bytes, &ours)?;
+    if length > head {
+        for z in [0, done.saturating_sub(1)] {
+            let mut ours = Vec::new();
+            T::write(slabs.at(z)?, &mut ours).map_err(GridError::io(path))?;
+            is_there(head + z as u64 * slab_bytes, &ours)?;
+        }
     }
     Ok(done)
 }

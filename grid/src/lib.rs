@@ -2,9 +2,9 @@
 //! complete.
 //!
 //! A solid of 2048³ voxels does not fit in memory and takes an hour to compute. [`write_volume`] computes and writes
-//! one z slab at a time, so the memory does not depend on the number of slabs. It writes to `FILE.partial`, which is
-//! renamed to `FILE` after the last slab: a reader never sees half a volume, and an error or a cancelled call leaves
-//! nothing behind. [`write_atomically`] does the same for any other file.
+//! one z slab at a time, so the memory does not depend on the number of slabs. It writes under a temporary name that no
+//! other file has, and renames after the last slab: a reader never sees half a volume, and an error or a cancelled call
+//! leaves nothing behind. [`write_atomically`] does the same for any other file, and [`Staging`] for a folder.
 //!
 //! Every format holds the same samples in the same order: z slowest, then y, then x, then the channel, little-endian.
 //!
@@ -78,6 +78,7 @@ mod frame;
 mod framed;
 mod hdf5;
 mod length_unit;
+mod names;
 mod npy;
 mod nrrd;
 #[cfg(feature = "read")]
@@ -87,6 +88,7 @@ mod read_volume;
 #[cfg(feature = "read")]
 mod sample_type;
 mod slabs;
+mod staging;
 #[cfg(feature = "read")]
 mod tiff_reader;
 mod tiff_stack;
@@ -101,11 +103,14 @@ pub use element::Element;
 pub use error::GridError;
 pub use format::Format;
 pub use length_unit::{LengthUnit, LengthUnitError};
+pub use names::{destination, exchange, give_name};
 pub use npy::read_npy;
 #[cfg(feature = "read")]
 pub use read_volume::{StoredVolume, read_volume};
 #[cfg(feature = "read")]
 pub use sample_type::SampleType;
+pub use staging::Staging;
 pub use volume_shape::VolumeShape;
 pub use voxel_size::VoxelSize;
 pub use write_volume::{resume_volume, write_volume};
+pub use zarr::foreign_file as foreign_file_in_zarr;

@@ -1,11 +1,11 @@
 //! A volume written to a file of any format, one z slab at a time, and resumed after an interruption.
 
-use crate::atomic::partial_name;
 use crate::disk_room::{bytes_in, refuse_without_room};
 use crate::element::Element;
 use crate::error::GridError;
 use crate::format::Format;
 use crate::frame::Frame;
+use crate::names::partial_name;
 use crate::slabs::Slabs;
 use crate::volume_shape::VolumeShape;
 use crate::voxel_size::VoxelSize;
@@ -53,7 +53,8 @@ pub fn write_volume<T: Element>(
 }
 
 /// Writes a volume as [`write_volume`] does, but continues `FILE.partial` if it exists, and keeps it if the call is
-/// cancelled or fails.
+/// cancelled or fails. Until then it is locked, so that no other process continues it too. A file called `path` that
+/// appears in the meantime is not replaced.
 ///
 /// `FILE.partial` must be the beginning of the same volume: its head is compared, and its first and last complete slab
 /// with what `fill` computes for them. So `fill` is called for those two slabs, then for every missing slab. The
@@ -61,7 +62,8 @@ pub fn write_volume<T: Element>(
 ///
 /// # Errors
 ///
-/// As [`write_volume`], and [`GridError::OtherPartial`] if `FILE.partial` is the beginning of another volume.
+/// As [`write_volume`]; [`GridError::OtherPartial`] if `FILE.partial` is anything but the beginning of this volume, which
+/// is left as it is; [`GridError::InUse`] if another process is writing it.
 ///
 /// # Examples
 ///

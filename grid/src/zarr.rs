@@ -9,16 +9,18 @@ mod levels;
 mod metadata;
 mod shard;
 
-use crate::atomic::{partial_name, write_atomically};
+use crate::atomic::{lock, named, write_atomically};
 use crate::element::Element;
 use crate::error::GridError;
+use crate::names::{destination, exchange, is_temporary, partial_name};
 use crate::slabs::Slabs;
+use crate::staging::Staging;
 use crate::volume_shape::VolumeShape;
 use crate::voxel_size::VoxelSize;
 use levels::Level;
 use ndarray::ArrayViewMut3;
 use shard::CHUNK;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -32,15 +34,15 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
     mut slabs: Slabs<T, F>,
 ) -> Result<(), GridError> {
     let folder = PartialFolder::open(path, resume)?;
-    let mut levels = Level::<T>::all(&folder.partial, shape);
+    let mut levels = Level::<T>::all(folder.path(), shape);
     let shapes: Vec<VolumeShape> = levels.iter().map(|level| level.shape).collect();
     let root = metadata::group(&shapes, shape, size);
     let done = if resume {
-        whole_slabs(&folder.partial, &root, &levels[0], &mut slabs)?
+        whole_slabs(folder.path(), &root, &levels[0], &mut slabs)?
     } else {
         0
     };
-    write_text(&folder.partial.join("zarr.json"), &root)?;
+    write_text(&folder.path().join("zarr.json"), &root)?;
     for level in &levels {
         fs::create_dir_all(&level.folder).map_err(GridError::io(path))?;
         write_text(
@@ -55,7 +57,7 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
         }
     }
     slabs.each(path, done, |slab| levels::push(&mut levels, slab, true))?;
-    folder.publish()
+    folder.publish(path)
 }
 
 /// Number of slabs of the finest resolution in complete shards. The metadata and the first and last of these slabs must
@@ -69,13 +71,25 @@ fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<
     let other = || GridError::OtherPartial {
         partial: partial.to_owned(),
     };
+    if foreign_file(partial).map_err(GridError::io(partial))?.is_some() {
+        return Err(other());
+    }
+    match fs::read_to_string(partial.join("zarr.json")) {
+        Ok(found) if found == root => {}
+        Ok(_) => return Err(other()),
+        // `zarr.json` is the first file of a volume.
+        Err(error)
+            if error.kind() == io::ErrorKind::NotFound
+                && fs::read_dir(partial).is_ok_and(|mut files| files.next().is_none()) =>
+        {
+            return Ok(0);
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(other()),
+        Err(error) => return Err(GridError::io(partial)(error)),
+    }
     let done = finest.whole_slabs();
     if done == 0 {
         return Ok(0);
-    }
-    let found = fs::read_to_string(partial.join("zarr.json")).map_err(GridError::io(partial))?;
-    if found != root {
-        return Err(other());
     }
     for z in [0, done - 1] {
         let theirs = finest.read_slabs(z / CHUNK * CHUNK)?;
@@ -90,60 +104,141 @@ fn write_text(path: &Path, text: &str) -> Result<(), GridError> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// `NAME.partial` while it is being filled; removed if dropped before it is published, unless it is to be kept.
-struct PartialFolder {
-    path: PathBuf,
-    partial: PathBuf,
-    keep: bool,
+/// The folder that is being filled.
+#[derive(Debug)]
+enum PartialFolder {
+    /// Under a temporary name; removed if dropped before it is published.
+    Temporary { staged: Staging, replaces: bool },
+    /// `NAME.partial`, locked; kept when dropped.
+    Resumable {
+        path: PathBuf,
+        partial: PathBuf,
+        replaces: bool,
+        _lock: File,
+    },
 }
 
 impl PartialFolder {
     fn open(path: &Path, resume: bool) -> Result<Self, GridError> {
-        if path.is_file() || (path.is_dir() && !is_zarr(path)) {
-            return Err(GridError::io(path)(io::Error::new(
-                io::ErrorKind::AlreadyExists,
-                "exists and is no Zarr folder; choose another name",
-            )));
+        let failed = || GridError::io(path);
+        let target = destination(path).map_err(failed())?;
+        let replaces = target.exists();
+        if replaces {
+            refuse_other_folder(path, &target)?;
         }
-        let partial = partial_name(path);
-        if partial.exists() && !resume {
-            fs::remove_dir_all(&partial).map_err(GridError::io(path))?;
+        if !resume {
+            let staged = Staging::beside(path).map_err(failed())?;
+            fs::create_dir(staged.path()).map_err(failed())?;
+            return Ok(Self::Temporary { staged, replaces });
         }
-        fs::create_dir_all(&partial).map_err(GridError::io(path))?;
-        Ok(Self {
-            path: path.to_owned(),
+        let partial = partial_name(&target);
+        fs::create_dir_all(&partial).map_err(failed())?;
+        let open = File::open(&partial).map_err(failed())?;
+        lock(&open, &partial)?;
+        remove_temporaries(&partial).map_err(failed())?;
+        Ok(Self::Resumable {
+            path: target,
             partial,
-            keep: resume,
+            replaces,
+            _lock: open,
         })
     }
 
-    fn publish(mut self) -> Result<(), GridError> {
-        self.keep = true; // complete: nothing to remove if a rename below fails
-        let failed = || GridError::io(&self.path);
-        let mut old = self.path.as_os_str().to_owned();
-        old.push(".old");
-        let old = PathBuf::from(old);
-        let replaces = self.path.exists();
-        if replaces {
-            fs::rename(&self.path, &old).map_err(failed())?;
+    fn path(&self) -> &Path {
+        match self {
+            Self::Temporary { staged, .. } => staged.path(),
+            Self::Resumable { partial, .. } => partial,
         }
-        fs::rename(&self.partial, &self.path).map_err(failed())?;
-        if replaces {
-            fs::remove_dir_all(&old).map_err(failed())?;
+    }
+
+    fn publish(self, path: &Path) -> Result<(), GridError> {
+        match self {
+            Self::Temporary { mut staged, replaces } => staged.publish(replaces),
+            Self::Resumable {
+                path,
+                partial,
+                replaces: false,
+                ..
+            } => named(&partial, &path, false),
+            Self::Resumable { path, partial, .. } => {
+                exchange(&partial, &path).and_then(|()| fs::remove_dir_all(&partial))
+            }
         }
-        Ok(())
+        .map_err(GridError::io(path))
     }
 }
 
-impl Drop for PartialFolder {
-    fn drop(&mut self) {
-        if !self.keep {
-            // A failed removal cannot be reported from here.
-            let _ = fs::remove_dir_all(&self.partial);
-        }
+/// Refuses to replace a file, or a folder with anything in it that is not of a Zarr volume of ours.
+fn refuse_other_folder(path: &Path, target: &Path) -> Result<(), GridError> {
+    let refused = |message: String| {
+        Err(GridError::io(path)(io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            message,
+        )))
+    };
+    if !target.is_dir() {
+        return refused("is a file, and no Zarr folder; choose another name".to_owned());
+    }
+    match foreign_file(target).map_err(GridError::io(path))? {
+        None => Ok(()),
+        Some(file) => refused(format!(
+            "contains {}, which is not of a Zarr volume of this program; move it away, or choose another name",
+            file.display()
+        )),
     }
 }
 
-fn is_zarr(folder: &Path) -> bool {
-    folder.join("zarr.json").is_file() || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none())
+/// A file or folder inside `folder` that no OME-Zarr folder of ours contains, relative to it.
+///
+/// # Errors
+///
+/// If the folder cannot be read.
+pub fn foreign_file(folder: &Path) -> io::Result<Option<PathBuf>> {
+    foreign_below(folder, Path::new(""))
+}
+
+fn foreign_below(folder: &Path, below: &Path) -> io::Result<Option<PathBuf>> {
+    let mut entries = fs::read_dir(folder.join(below))?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let inside = below.join(entry.file_name());
+        let is_folder = entry.file_type()?.is_dir();
+        if !is_of_zarr(&inside, is_folder) {
+            return Ok(Some(inside));
+        }
+        if is_folder && let Some(file) = foreign_below(folder, &inside)? {
+            return Ok(Some(file));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether [`write`] makes such a file or folder: `zarr.json`, `LEVEL/zarr.json`, `LEVEL/c/0/Z/Y/X`.
+fn is_of_zarr(inside: &Path, is_folder: bool) -> bool {
+    let is_number = |name: &str| !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit());
+    let parts: Option<Vec<&str>> = inside.iter().map(std::ffi::OsStr::to_str).collect();
+    match parts.as_deref() {
+        Some(["zarr.json"]) => !is_folder,
+        Some([level]) => is_folder && is_number(level),
+        Some([_, "zarr.json"]) => !is_folder,
+        Some([_, "c"]) => is_folder,
+        Some([_, "c", rest @ ..]) => is_folder == (rest.len() < 4) && rest.iter().all(|part| is_number(part)),
+        _ => false,
+    }
+}
+
+/// Removes temporary files that a killed process left beside files of ours in `NAME.partial`.
+fn remove_temporaries(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let of = name.split('.').next().unwrap_or_default();
+        if entry.file_type()?.is_dir() {
+            remove_temporaries(&entry.path())?;
+        } else if is_temporary(&name, "zarr.json") || (of.parse::<u64>().is_ok() && is_temporary(&name, of)) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }

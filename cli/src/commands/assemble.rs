@@ -13,7 +13,7 @@ use stereology::volume::Solid;
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{OutputFolder, write_json};
+use crate::outputs::{Output, write_json};
 use crate::progress::go_on;
 use crate::values::BinderArgument;
 use stereology_report::{counted, significant};
@@ -50,7 +50,7 @@ pub struct Assemble {
     pub voids: Vec<usize>,
     /// Folder for the solid
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// JSON of `stereology assemble`.
@@ -84,7 +84,7 @@ impl Assemble {
                 ));
             }
         };
-        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let folder = everywhere.outputs.folder(&self.output)?;
         let opened = solid::read_packing(&self.packing).at(&self.packing)?;
         let bare = opened.solid;
         let colours = match &self.colours {
@@ -126,7 +126,6 @@ impl Assemble {
         };
         let answer = Answer::new(&fields, notes)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
-        folder.publish()?;
         Ok(answer)
     }
 }

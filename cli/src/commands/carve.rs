@@ -15,7 +15,7 @@ use crate::commands::render::Placement;
 use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_file;
+use crate::outputs::Output;
 use crate::progress::Step;
 use crate::values::{count, positive};
 use crate::warnings::Warning;
@@ -57,7 +57,14 @@ pub struct Carve {
     pub atlas: Option<u32>,
     /// File: .glb or .ply
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
+}
+
+/// The file to write.
+struct Written {
+    file: PathBuf,
+    /// Factor to its coordinates, if they are in metres.
+    metres: Option<f64>,
 }
 
 /// JSON of `stereology carve`.
@@ -95,22 +102,23 @@ impl Carve {
         if self.atlas.is_some() && !ends_in("glb") {
             return Err(Failure::usage("with --atlas, -o needs a file that ends in .glb"));
         }
-        check_file(&self.output, everywhere.force)?;
-        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
+        let file = everywhere.outputs.file(&self.output)?;
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid, everywhere)?;
         let mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         let placement = Placement::of(&mesh, &solid, self.period);
         // glTF prescribes metres.
         let metres = unit
             .filter(|_| ends_in("glb"))
             .map(|unit| placement.scale() * unit.in_metres());
+        let written = Written { file, metres };
         let place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync) = if self.turned {
             &|p| turned(&placement.apply(p))
         } else {
             &|p| placement.apply(p)
         };
         match self.atlas {
-            Some(pixels) => self.bake(&solid, &mesh, place, pixels, metres, everywhere),
-            None => self.refine(&solid, &mesh, place, metres, everywhere),
+            Some(pixels) => self.bake(&solid, &mesh, place, pixels, &written, everywhere),
+            None => self.refine(&solid, &mesh, place, &written, everywhere),
         }
     }
 
@@ -119,7 +127,7 @@ impl Carve {
         solid: &Solid,
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
-        metres: Option<f64>,
+        written: &Written,
         everywhere: &Everywhere,
     ) -> Result<Answer, Failure> {
         let options = CarveOptions {
@@ -131,8 +139,8 @@ impl Carve {
             .carve(mesh, place, &options, &|done| step.at(done))
             .map_err(|error| self.failure(error))?;
         drop(step);
-        let in_metres = in_metres(&mut carved.coloured.mesh, metres);
-        write_coloured_mesh(&self.output, &carved.coloured).at(&self.output)?;
+        let in_metres = in_metres(&mut carved.coloured.mesh, written.metres);
+        write_coloured_mesh(&written.file, &carved.coloured).at(&written.file)?;
         let mesh = &carved.coloured.mesh;
         let mut notes = Notes::default();
         notes.line(format!(
@@ -167,7 +175,7 @@ impl Carve {
         mesh: &TriangleMesh,
         place: &(dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
         pixels: u32,
-        metres: Option<f64>,
+        written: &Written,
         everywhere: &Everywhere,
     ) -> Result<Answer, Failure> {
         let options = BakeOptions {
@@ -179,8 +187,8 @@ impl Carve {
             .bake(mesh, place, &options, &|done| step.at(done))
             .map_err(|error| self.failure(error))?;
         drop(step);
-        let in_metres = in_metres(&mut baked.textured.mesh, metres);
-        write_textured_mesh(&self.output, &baked.textured).at(&self.output)?;
+        let in_metres = in_metres(&mut baked.textured.mesh, written.metres);
+        write_textured_mesh(&written.file, &baked.textured).at(&written.file)?;
         let mut notes = Notes::default();
         notes.line(format!(
             "{} triangles in {} charts of an atlas of {pixels} x {pixels} pixels written to {}",

@@ -14,7 +14,7 @@ use stereology::segment::{read_labels, read_photo};
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_text};
+use crate::outputs::{Output, write_text};
 use crate::values::{bins, not_negative, positive};
 
 /// Measures the spherical contact distribution of two regions: the distances of their points to the interface between
@@ -70,7 +70,7 @@ pub struct Contact {
     pub share: f64,
     /// File for the distribution (.json)
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// How distances are measured.
@@ -127,7 +127,7 @@ impl Fields for ContactFields {
 
 impl Contact {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        check_file(&self.output, everywhere.force)?;
+        let file = everywhere.outputs.file(&self.output)?;
         let Source { of, threshold, pixels } = match (&self.image, self.negative_law, self.positive_law) {
             (Some(image), ..) => self.measure(image)?,
             (None, Some(negative), Some(positive)) => Source {
@@ -144,7 +144,7 @@ impl Contact {
             .iter()
             .try_fold(of, |of, &(bin, share)| of.edited(bin, share))
             .or_usage("--edit")?;
-        write_text(&self.output, &of.to_json())?;
+        write_text(&file, &of.to_json())?;
         let mut notes = Notes::default();
         notes.line(format!(
             "positive region {:.1} %, distances up to {:.4}; negative region {:.1} %, up to {:.4} -> {}",

@@ -21,7 +21,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::contact::read_contact;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_text};
+use crate::outputs::{Output, write_text};
 use crate::progress::Step;
 use crate::values::{count, positive};
 use crate::warnings::Warning;
@@ -88,13 +88,13 @@ pub struct Displace {
     pub colours: Colours,
     /// Also write the labels, with columns triangle and label
     #[arg(long, value_name = "CSV")]
-    pub labels_out: Option<PathBuf>,
+    pub labels_out: Option<Output>,
     /// Also write the design: all settings, for --design
     #[arg(long, value_name = "JSON")]
-    pub design_out: Option<PathBuf>,
+    pub design_out: Option<Output>,
     /// Mesh file to write: .obj, .ply, .glb or .stl
     #[arg(short, long, value_name = "MESH")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// How labels are assigned.
@@ -190,17 +190,21 @@ impl Fields for DisplaceFields {
 impl Displace {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let began = Instant::now();
-        let is_glb = ends_in(&self.output, "glb");
+        let is_glb = ends_in(self.output.name(), "glb");
         if !is_glb {
-            MeshFormat::from_path(&self.output).or_usage("-o (or .glb)")?;
+            MeshFormat::from_path(self.output.name()).or_usage("-o (or .glb)")?;
         }
-        if self.colours != Colours::None && !is_glb && !ends_in(&self.output, "ply") {
+        if self.colours != Colours::None && !is_glb && !ends_in(self.output.name(), "ply") {
             return Err(Failure::usage("--colours need a file that ends in .glb or .ply"));
         }
-        let files = [Some(&self.output), self.labels_out.as_ref(), self.design_out.as_ref()];
-        for file in files.into_iter().flatten() {
-            check_file(file, everywhere.force)?;
-        }
+        let file = everywhere.outputs.file(&self.output)?;
+        let of = |option: &Option<Output>| {
+            option
+                .as_ref()
+                .map(|output| everywhere.outputs.file(output))
+                .transpose()
+        };
+        let (labels_out, design_out) = (of(&self.labels_out)?, of(&self.design_out)?);
         let design = self.choices(everywhere)?;
         let mut mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         mesh.weld();
@@ -223,10 +227,10 @@ impl Displace {
             (relief, values) = (simple.mesh, simple.values);
         }
         crate::progress::go_on()?;
-        if let Some(path) = &self.labels_out {
+        if let Some(path) = &labels_out {
             write_labels(path, &made.labels)?;
         }
-        if let Some(path) = &self.design_out {
+        if let Some(path) = &design_out {
             let mut design = design.clone();
             if let Some(length) = self.edge_length {
                 design.edge_length = Some(length / half_side(&mesh));
@@ -234,6 +238,7 @@ impl Displace {
             write_text(path, &design.to_json())?;
         }
         self.write(
+            &file,
             &relief,
             &values,
             design.contact.positive().len().max(1) as f64 * design.contact.bin_width(),
@@ -326,16 +331,16 @@ impl Displace {
         })
     }
 
-    fn write(&self, relief: &TriangleMesh, values: &[f64], far: f64) -> Result<(), Failure> {
-        if self.colours == Colours::None && !ends_in(&self.output, "glb") {
-            return write_mesh(&self.output, relief).at(&self.output);
+    fn write(&self, file: &Path, relief: &TriangleMesh, values: &[f64], far: f64) -> Result<(), Failure> {
+        if self.colours == Colours::None && !ends_in(self.output.name(), "glb") {
+            return write_mesh(file, relief).at(file);
         }
         let coloured = ColouredMesh {
             normals: corner_normals(relief),
             colours: values.iter().map(|&x| self.colours.of(x, far)).collect(),
             mesh: relief.clone(),
         };
-        write_coloured_mesh(&self.output, &coloured).at(&self.output)
+        write_coloured_mesh(file, &coloured).at(file)
     }
 
     fn answer(

@@ -18,7 +18,7 @@ use stereology::segment::read_photo;
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_file;
+use crate::outputs::Output;
 use crate::progress::{Step, go_on, stopped};
 use crate::values::{Extent, count};
 use stereology_report::significant;
@@ -94,10 +94,10 @@ pub struct Exemplar {
     /// Also write the pixel from which each voxel was copied, u32, row x width + column, counted through all images;
     /// 4294967295 outside the mask
     #[arg(long, value_name = "FILE")]
-    pub sources: Option<PathBuf>,
+    pub sources: Option<Output>,
     /// File for the solid: .npy, .nrrd, .vti, .tif, .h5 or .zarr
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// Synthesis method.
@@ -211,12 +211,15 @@ impl Fields for ExemplarFields {
 
 impl Exemplar {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let format = Format::from_path(&self.output).or_usage("-o")?;
-        check_file(&self.output, everywhere.force)?;
-        if let Some(path) = &self.sources {
-            Format::from_path(path).or_usage("--sources")?;
-            check_file(path, everywhere.force)?;
-        }
+        let format = Format::from_path(self.output.name()).or_usage("-o")?;
+        let file = everywhere.outputs.volume(&self.output, format)?;
+        let sources = match &self.sources {
+            None => None,
+            Some(output) => {
+                let format = Format::from_path(output.name()).or_usage("--sources")?;
+                Some((everywhere.outputs.volume(output, format)?, format))
+            }
+        };
         let size = match self.size.0[..] {
             [n] => [n; 3],
             [nz, ny, nx] => [nz, ny, nx],
@@ -251,13 +254,12 @@ impl Exemplar {
             sides: [everywhere.scale; 3],
             unit: everywhere.unit,
         };
-        write::<u8>(&self.output, format, shape, voxel, |z, y, x, channel| {
+        write::<u8>(&file, format, shape, voxel, |z, y, x, channel| {
             (solid.values[[z, y, x, channel]] * scale).round().clamp(0.0, 255.0) as u8
         })?;
-        if let Some(path) = &self.sources {
-            let format = Format::from_path(path).or_usage("--sources")?;
+        if let Some((path, format)) = sources {
             let shape = VolumeShape { channels: 1, ..shape };
-            write::<u32>(path, format, shape, voxel, |z, y, x, _| solid.sources[[z, y, x]])?;
+            write::<u32>(&path, format, shape, voxel, |z, y, x, _| solid.sources[[z, y, x]])?;
         }
         let fields = self.fields(&mut notes, &solid, &pictures, &options, begin.elapsed().as_secs_f64());
         Answer::new(&fields, notes)

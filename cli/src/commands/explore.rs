@@ -22,7 +22,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::contact::read_contact;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{OutputFolder, write_json, write_png, write_text};
+use crate::outputs::{Output, OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Step, go_on};
 use crate::values::{count, positive};
 
@@ -81,7 +81,7 @@ pub struct Explore {
     pub view: [f32; 2],
     /// Folder for the gallery
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 fn range(text: &str) -> Result<[f64; 2], String> {
@@ -146,7 +146,7 @@ impl Explore {
             }
             None => None,
         };
-        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let folder = everywhere.outputs.folder(&self.output)?;
         let mut mesh = read_mesh(&self.mesh).at(&self.mesh)?;
         mesh.weld();
         if let Some(length) = self.edge_length {
@@ -207,11 +207,10 @@ impl Explore {
         let mut answer = Answer::new(&fields, Notes::default())?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
-        let place = folder.publish()?;
         answer.notes.seconds(began.elapsed().as_secs_f64()).line(format!(
             "{} candidates: open {}",
             self.count,
-            place.join("index.html").display()
+            self.output.name().join("index.html").display()
         ));
         Ok(answer)
     }

@@ -13,7 +13,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_volume;
+use crate::outputs::Output;
 use crate::progress::Step;
 use crate::values::count;
 
@@ -54,7 +54,7 @@ pub struct Export {
     pub resume: bool,
     /// File: .npy, .nrrd, .vti, .tif, .h5 or .zarr
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// Content of a voxel.
@@ -98,9 +98,13 @@ impl Fields for ExportFields {
 
 impl Export {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let format = Format::from_path(&self.output).or_usage("-o")?;
-        check_volume(&self.output, format, everywhere.force)?;
-        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
+        let format = Format::from_path(self.output.name()).or_usage("-o")?;
+        let file = if self.resume {
+            everywhere.outputs.resumed_volume(&self.output, format)?
+        } else {
+            everywhere.outputs.volume(&self.output, format)?
+        };
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid, everywhere)?;
         let (channel, name) = match self.channel {
             Channel::Rgb => (volume::Channel::Rgb, "rgb"),
             Channel::Id => (volume::Channel::Id, "id"),
@@ -116,11 +120,11 @@ impl Export {
             ..solid.voxel_grid(self.voxels)
         };
         if self.resume {
-            solid.resume_voxels(&self.output, format, &grid, channel, &progress)
+            solid.resume_voxels(&file, format, &grid, channel, &progress)
         } else {
-            solid.write_voxels(&self.output, format, &grid, channel, &progress)
+            solid.write_voxels(&file, format, &grid, channel, &progress)
         }
-        .at(&self.output)?;
+        .at(&file)?;
         drop(step);
         let [nx, ny, nz] = grid.counts;
         let mut notes = Notes::default();

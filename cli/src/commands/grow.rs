@@ -23,7 +23,7 @@ use self::measurements::Unit;
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body};
-use crate::outputs::{check_file, write_png};
+use crate::outputs::{Output, write_png};
 use crate::progress::{Step, go_on, stopped};
 use crate::values::count;
 use crate::warnings::Warning;
@@ -80,14 +80,14 @@ pub struct Grow {
     pub levels: Option<usize>,
     /// Also write the cell of each voxel, u32 from 1; 0 is outside the mesh
     #[arg(long, value_name = "FILE")]
-    pub cells: Option<PathBuf>,
+    pub cells: Option<Output>,
     /// Also write the texel of IMAGE from which each voxel was copied, u32, row x width + column; 4294967295 where
     /// nothing was copied
     #[arg(long, value_name = "FILE")]
-    pub sources: Option<PathBuf>,
+    pub sources: Option<Output>,
     /// File for the stone: .npy, .nrrd, .vti, .tif; .png for picture:H,W
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// Planes of the windows.
@@ -186,15 +186,21 @@ impl Grow {
         if let Some(size) = self.mesh.strip_prefix("picture:") {
             return self.picture(size, everywhere);
         }
-        let format = Format::from_path(&self.output).or_usage("-o")?;
-        let further = [("--cells", &self.cells), ("--sources", &self.sources)];
-        check_file(&self.output, everywhere.force)?;
-        for (option, path) in further {
-            if let Some(path) = path {
-                Format::from_path(path).or_usage(option)?;
-                check_file(path, everywhere.force)?;
-            }
-        }
+        let volume = |option: &str, output: &Output| {
+            let format = Format::from_path(output.name()).or_usage(option)?;
+            Ok::<_, Failure>((everywhere.outputs.volume(output, format)?, format))
+        };
+        let (file, format) = volume("-o", &self.output)?;
+        let cells = self
+            .cells
+            .as_ref()
+            .map(|output| volume("--cells", output))
+            .transpose()?;
+        let sources = self
+            .sources
+            .as_ref()
+            .map(|output| volume("--sources", output))
+            .transpose()?;
         let resolution = self.resolution.ok_or_else(|| {
             Failure::usage("--resolution N is missing: the number of voxels along the mesh's longest side")
         })?;
@@ -246,14 +252,13 @@ impl Grow {
             unit: everywhere.unit,
         };
         if image.is_bytes {
-            write(&self.output, format, spacing, &grown.values.mapv(|v| v as u8))?;
+            write(&file, format, spacing, &grown.values.mapv(|v| v as u8))?;
         } else {
-            write(&self.output, format, spacing, &grown.values)?;
+            write(&file, format, spacing, &grown.values)?;
         }
-        for (path, numbers) in [(&self.cells, &grown.labels), (&self.sources, &grown.sources)] {
-            if let Some(path) = path {
-                let format = Format::from_path(path).or_usage("FILE")?;
-                write(path, format, spacing, &numbers.clone().insert_axis(Axis(3)))?;
+        for (output, numbers) in [(cells, &grown.labels), (sources, &grown.sources)] {
+            if let Some((path, format)) = output {
+                write(&path, format, spacing, &numbers.clone().insert_axis(Axis(3)))?;
             }
         }
         let found = seams(grown.values.view(), grown.labels.view());
@@ -373,7 +378,7 @@ impl Grow {
                 "picture:H,W needs -o FILE.png, and --resolution, --measured, --cells, --sources and --finish do not apply to it",
             ));
         }
-        check_file(&self.output, everywhere.force)?;
+        let file = everywhere.outputs.file(&self.output)?;
         let image = self.image()?;
         let channels = image.samples.dim().2;
         if !image.is_bytes || !(channels == 1 || channels == 3) {
@@ -406,7 +411,7 @@ impl Grow {
         .map_err(|error| self.explained(&error))?;
         drop(step);
         go_on()?;
-        write_png(&self.output, &as_picture(&made.view()))?;
+        write_png(&file, &as_picture(&made.view()))?;
         let seconds = begin.elapsed().as_secs_f64();
         let mut notes = Notes::default();
         notes

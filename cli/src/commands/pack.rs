@@ -20,7 +20,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::pack_quality::{self, QualityFields};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body};
-use crate::outputs::{check_file, write_png, write_text};
+use crate::outputs::{Output, Outputs, write_png, write_text};
 use crate::particle_files::ParticleFormat;
 use crate::particle_surfaces;
 use crate::progress::{Step, go_on};
@@ -73,20 +73,20 @@ pub struct Pack {
     pub quality: bool,
     /// File for the packing (JSON)
     #[arg(short, long, value_name = "packing.json")]
-    pub output: PathBuf,
+    pub output: Output,
     /// Also write packing.csv, packing.xyz (OVITO) or packing.vtp (ParaView, one point per particle); may be repeated
     #[arg(long, value_name = "FILE")]
-    pub also: Vec<PathBuf>,
+    pub also: Vec<Output>,
     /// Also write the surfaces of the particles for ParaView; every face has the number, size, shape and category of
     /// its particle
     #[arg(long, value_name = "packing.vtp")]
-    pub surfaces: Option<PathBuf>,
+    pub surfaces: Option<Output>,
     /// Also write an image of the packing (PNG)
     #[arg(long, value_name = "PNG")]
-    pub picture: Option<PathBuf>,
+    pub picture: Option<Output>,
     /// Also write the energy of the overlaps at each iteration (CSV)
     #[arg(long, value_name = "CSV")]
-    pub trace: Option<PathBuf>,
+    pub trace: Option<Output>,
 }
 
 /// Source of the sizes.
@@ -196,6 +196,36 @@ impl Population {
     }
 }
 
+/// Where to write.
+struct Files {
+    packing: PathBuf,
+    also: Vec<(ParticleFormat, PathBuf)>,
+    surfaces: Option<PathBuf>,
+    picture: Option<PathBuf>,
+    trace: Option<PathBuf>,
+}
+
+impl Files {
+    fn write(&self, packing: &Packing, names: Vec<String>, unit: Option<LengthUnit>) -> Result<(), Failure> {
+        for (format, path) in &self.also {
+            format.write(path, packing, unit)?;
+        }
+        if let Some(path) = &self.surfaces {
+            particle_surfaces::write(path, packing.bodies(), packing.particles())?;
+        }
+        if let Some(path) = &self.picture {
+            write_png(path, &pack_quality::picture(packing).or_fail()?)?;
+        }
+        if let Some(path) = &self.trace {
+            write_text(path, &pack_quality::trace(packing))?;
+        }
+        PackingFile::new(names, packing.particles(), packing.period())
+            .with_unit(unit)
+            .write(&self.packing)
+            .at(&self.packing)
+    }
+}
+
 /// JSON of `stereology pack`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PackFields {
@@ -246,7 +276,7 @@ impl Pack {
         if !(0.005..=1.0).contains(&self.tolerance) {
             return Err(Failure::usage("--tolerance: a fraction from 0.005 to 1 is needed"));
         }
-        let also = self.check_outputs(everywhere.force)?;
+        let files = self.files(&everywhere.outputs)?;
         let started = Instant::now();
         let unit = self.unit(everywhere)?;
         let Shapes { names, shares, bodies } = self.shapes()?;
@@ -266,7 +296,7 @@ impl Pack {
         .map_err(pack_failure)?;
         drop(step);
         go_on()?;
-        self.write(&also, &packing, names, unit)?;
+        files.write(&packing, names, unit)?;
 
         let sides: [f64; 3] = packing.sides().into();
         let mut notes = notes(&packing, started.elapsed(), expected);
@@ -289,45 +319,22 @@ impl Pack {
         Answer::new(&fields, notes)
     }
 
-    /// Checks that all outputs can be written; returns those of `--also` with their formats.
-    fn check_outputs(&self, force: bool) -> Result<Vec<(&Path, ParticleFormat)>, Failure> {
-        check_file(&self.output, force)?;
-        if let Some(path) = &self.surfaces {
-            particle_surfaces::check_ending(path)?;
+    fn files(&self, outputs: &Outputs) -> Result<Files, Failure> {
+        let file = |output: &Option<Output>| output.as_ref().map(|output| outputs.file(output)).transpose();
+        if let Some(output) = &self.surfaces {
+            particle_surfaces::check_ending(output.name())?;
         }
-        for path in self.picture.iter().chain(&self.trace).chain(&self.surfaces) {
-            check_file(path, force)?;
-        }
-        let also = self.also.iter().map(|path| {
-            check_file(path, force)?;
-            Ok((path.as_path(), ParticleFormat::of(path)?))
-        });
-        also.collect()
-    }
-
-    fn write(
-        &self,
-        also: &[(&Path, ParticleFormat)],
-        packing: &Packing,
-        names: Vec<String>,
-        unit: Option<LengthUnit>,
-    ) -> Result<(), Failure> {
-        for (path, format) in also {
-            format.write(path, packing, unit)?;
-        }
-        if let Some(path) = &self.surfaces {
-            particle_surfaces::write(path, packing.bodies(), packing.particles())?;
-        }
-        if let Some(path) = &self.picture {
-            write_png(path, &pack_quality::picture(packing).or_fail()?)?;
-        }
-        if let Some(path) = &self.trace {
-            write_text(path, &pack_quality::trace(packing))?;
-        }
-        PackingFile::new(names, packing.particles(), packing.period())
-            .with_unit(unit)
-            .write(&self.output)
-            .at(&self.output)
+        let also = self
+            .also
+            .iter()
+            .map(|output| Ok((ParticleFormat::of(output.name())?, outputs.file(output)?)));
+        Ok(Files {
+            packing: outputs.file(&self.output)?,
+            also: also.collect::<Result<_, Failure>>()?,
+            surfaces: file(&self.surfaces)?,
+            picture: file(&self.picture)?,
+            trace: file(&self.trace)?,
+        })
     }
 
     /// The unit of the table of sizes or densities, or of the options.

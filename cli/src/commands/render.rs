@@ -16,7 +16,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_png};
+use crate::outputs::{Output, write_png};
 use crate::progress::Step;
 use crate::values::{Triple, count, not_negative, positive};
 
@@ -66,7 +66,7 @@ pub struct Render {
     pub turntable: Option<usize>,
     /// Image to write
     #[arg(short, long, value_name = "PNG")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// An axis of the solid or the mesh.
@@ -104,9 +104,12 @@ impl Fields for RenderFields {
 
 impl Render {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let files = self.files();
-        files.iter().try_for_each(|file| check_file(file, everywhere.force))?;
-        let solid = open_solid(&self.solid)?.solid;
+        let names = self.names();
+        let files: Vec<PathBuf> = names
+            .iter()
+            .map(|name| everywhere.outputs.file_called(name))
+            .collect::<Result<_, _>>()?;
+        let solid = open_solid(&self.solid, everywhere)?.solid;
         let (mesh, seen) = self.scene(&solid)?;
         let options = RenderOptions {
             samples: self.samples,
@@ -136,7 +139,7 @@ impl Render {
             write_png(file, &picture)?;
         }
         drop(step);
-        let written = match files.as_slice() {
+        let written = match names.as_slice() {
             [file] => format!("written to {}", file.display()),
             [first, .., last] => format!("each, {} to {}", first.display(), last.display()),
             [] => String::new(),
@@ -152,15 +155,19 @@ impl Render {
     }
 
     /// The image, or those of a turntable.
-    fn files(&self) -> Vec<PathBuf> {
+    fn names(&self) -> Vec<PathBuf> {
         let Some(frames) = self.turntable else {
-            return vec![self.output.clone()];
+            return vec![self.output.name().to_owned()];
         };
         let part = |part: Option<&OsStr>| part.map_or_else(String::new, |part| part.to_string_lossy().into_owned());
-        let (stem, ending) = (part(self.output.file_stem()), part(self.output.extension()));
+        let (stem, ending) = (part(self.output.name().file_stem()), part(self.output.extension()));
         let digits = (frames - 1).to_string().len().max(3);
         (0..frames)
-            .map(|k| self.output.with_file_name(format!("{stem}_{k:0digits$}.{ending}")))
+            .map(|k| {
+                self.output
+                    .name()
+                    .with_file_name(format!("{stem}_{k:0digits$}.{ending}"))
+            })
             .collect()
     }
 

@@ -1,12 +1,9 @@
 //! `stereology schema`: JSON Schemas of the answers.
 
-use std::io::{self, Write};
-use std::path::PathBuf;
-
 use clap::Args;
 use schemars::Schema;
 
-use crate::answer::{Fields, schema_of};
+use crate::answer::{Fields, print, schema_of};
 use crate::commands::assemble::AssembleFields;
 use crate::commands::carve::CarveFields;
 use crate::commands::contact::ContactFields;
@@ -27,8 +24,8 @@ use crate::commands::synthesize::SynthesizeFields;
 use crate::commands::texture::TextureFields;
 use crate::commands::unfold::UnfoldFields;
 use crate::everywhere::Everywhere;
-use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_text};
+use crate::failure::Failure;
+use crate::outputs::{Output, write_text};
 
 /// Prints the JSON Schema of a command's --json answer
 ///
@@ -47,7 +44,7 @@ pub struct SchemaOf {
     pub command: Option<String>,
     /// Write the schemas of all commands into this folder
     #[arg(short, long, value_name = "DIR")]
-    pub output: Option<PathBuf>,
+    pub output: Option<Output>,
 }
 
 /// A command and the schema of its answer.
@@ -91,8 +88,9 @@ impl SchemaOf {
     pub fn run(&self, everywhere: &Everywhere) -> Result<(), Failure> {
         if let Some(folder) = &self.output {
             for Entry { command, schema } in entries() {
-                let path = folder.join(format!("{command}.json"));
-                check_file(&path, everywhere.force)?;
+                let path = everywhere
+                    .outputs
+                    .file_called(&folder.name().join(format!("{command}.json")))?;
                 write_text(&path, &text(&schema()))?;
             }
             return Ok(());
@@ -106,7 +104,7 @@ impl SchemaOf {
                 names.join(", ")
             )));
         };
-        io::stdout().write_all(text(&schema()).as_bytes()).or_fail()
+        print(&text(&schema()))
     }
 }
 

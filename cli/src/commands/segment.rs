@@ -13,7 +13,7 @@ use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, r
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{OutputFolder, check_file, write_json};
+use crate::outputs::{Output, OutputFolder, write_json};
 use crate::progress::{Step, go_on};
 use crate::values::{BinderArgument, CategoriesArgument, pair, positive};
 use crate::warnings::Warning;
@@ -39,12 +39,12 @@ pub struct Segment {
     pub photo: PathBuf,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Output,
     /// Also write the labels to this file, to correct them in another tool and import them with --labels; the extension
     /// selects the format: .tif, .png, .npy (napari), .zip (Fiji's ROI manager), .geojson (QGIS), .json (COCO); may be
     /// repeated
     #[arg(long, value_name = "FILE")]
-    pub labels_out: Vec<PathBuf>,
+    pub labels_out: Vec<Output>,
     /// Refuse photographs with more pixels; segmentation needs about 100 bytes per pixel
     #[arg(long, value_name = "N", default_value_t = 150_000_000)]
     pub max_pixels: u64,
@@ -148,11 +148,13 @@ impl Choices {
 
 impl Segment {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        for path in &self.labels_out {
-            check_file(path, everywhere.force)?;
-        }
         everywhere.refuse_unit_of_pixels()?;
-        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let labels_out: Vec<PathBuf> = self
+            .labels_out
+            .iter()
+            .map(|output| everywhere.outputs.file(output))
+            .collect::<Result<_, _>>()?;
+        let folder = everywhere.outputs.folder(&self.output)?;
         let read = read_photo_up_to(&self.photo, self.max_pixels).at(&self.photo)?;
         let (photo, mut findings) = (read.photo, read.findings);
         let options = self.choices.options(everywhere.seed).with_compression(read.compression);
@@ -192,17 +194,16 @@ impl Segment {
             .line(format!("colour categories  {}", found.categories.len()))
             .line(format!(
                 "look at            {}",
-                self.output.join("overlay.png").display()
+                self.output.name().join("overlay.png").display()
             ));
         let head = profiles::head(&found, scale, everywhere.unit, options.edge_rule);
         write_files(&folder, &found, scale, &head)?;
-        for path in &self.labels_out {
+        for path in &labels_out {
             write_labels(path, found.labels.view()).at(path)?;
         }
         let answer = Answer::new(&SegmentFields::of(&found, scale, everywhere.unit), notes)?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
-        folder.publish()?;
         Ok(answer)
     }
 }

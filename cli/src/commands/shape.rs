@@ -1,7 +1,5 @@
 //! `stereology shape`: a body as a mesh file.
 
-use std::path::PathBuf;
-
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,7 +8,7 @@ use stereology::shape::{Body, BodyKind, ClosedMesh, ControlSphere, MeshFormat, S
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body_welding};
-use crate::outputs::{check_file, write_text};
+use crate::outputs::{Output, write_text};
 use crate::values::positive;
 use crate::warnings::Warning;
 use stereology_report::significant;
@@ -42,7 +40,7 @@ pub struct Shape {
     pub spec: String,
     /// Mesh file to write: .obj, .ply (double precision), .stl (single precision); or .json for control points
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
     /// Number of subdivisions, each of which splits every triangle into four; spheres and ellipsoids start from an
     /// icosahedron [default: 0; 5 for spheres and ellipsoids]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=7))]
@@ -102,21 +100,21 @@ impl Fields for ShapeFields {
 
 impl Shape {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        check_file(&self.output, everywhere.force)?;
+        let file = everywhere.outputs.file(&self.output)?;
         let wants_control_points = self
             .output
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
         if !wants_control_points {
-            MeshFormat::from_path(&self.output).or_usage("-o")?;
+            MeshFormat::from_path(self.output.name()).or_usage("-o")?;
         }
         let body = body_welding(&self.spec, self.weld)?;
         let written = if wants_control_points {
-            write_text(&self.output, &self.control_points(&body)?.to_json())?;
+            write_text(&file, &self.control_points(&body)?.to_json())?;
             None
         } else {
             let mesh = self.mesh(&body)?;
-            write_mesh(&self.output, &mesh).at(&self.output)?;
+            write_mesh(&file, &mesh).at(&file)?;
             Some(mesh)
         };
         self.answer(&body, written.as_ref())

@@ -14,7 +14,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::solid_files::open_solid;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_png};
+use crate::outputs::{Output, write_png};
 use crate::progress::go_on;
 use crate::values::{Triple, count, finite};
 use stereology_report::significant;
@@ -47,7 +47,7 @@ pub struct Slice {
     pub size: usize,
     /// Image to write
     #[arg(short, long, value_name = "PNG")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// An axis of the box.
@@ -77,8 +77,8 @@ impl Fields for SliceFields {
 
 impl Slice {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        check_file(&self.output, everywhere.force)?;
-        let SavedSolid { solid, unit, .. } = open_solid(&self.solid)?;
+        let file = everywhere.outputs.file(&self.output)?;
+        let SavedSolid { solid, unit, .. } = open_solid(&self.solid, everywhere)?;
         let sides = solid.period().sides();
         let (plane, [across, down]) = match self.normal {
             Some(Triple(normal)) => {
@@ -99,7 +99,7 @@ impl Slice {
         let pixels = |extent: f64| ((extent / pixel).round() as u32).max(1);
         let picture = solid.slice(&plane, pixels(across), pixels(down), pixel).or_fail()?;
         go_on()?;
-        write_png(&self.output, &picture)?;
+        write_png(&file, &picture)?;
         let mut notes = Notes::default();
         notes.line(format!(
             "{} x {} pixels with side {}{} written to {}",

@@ -31,7 +31,7 @@ use crate::commands::unfold::{CategoryFields, Defaults, UnfoldingFields, types};
 use crate::commands::{pack, segment, texture, unfold};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{OutputFolder, write_json, write_png, write_text};
+use crate::outputs::{Output, OutputFolder, write_json, write_png, write_text};
 use crate::progress::{Stages, go_on};
 use crate::values::{ShapeShare, count, positive, share};
 use crate::warnings::advice;
@@ -61,7 +61,7 @@ pub struct Synthesize {
     pub from: Option<PathBuf>,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Output,
     #[command(flatten)]
     pub segment: segment::Choices,
     #[command(flatten)]
@@ -274,7 +274,7 @@ impl Synthesize {
                 3.0 * (self.solid.voxels as f64).powi(3)
             )));
         }
-        let folder = OutputFolder::begin(&self.output, everywhere.force)?;
+        let folder = everywhere.outputs.folder(&self.output)?;
         let (
             PhotoFile {
                 photo,
@@ -319,7 +319,6 @@ impl Synthesize {
         files::steps::write(folder.file(""), &synthesis).or_fail()?;
         write_json(&folder.file("summary.json"), &answer.summary())?;
         go_on()?;
-        folder.publish()?;
         if self.from.is_some() {
             answer
                 .notes
@@ -333,7 +332,7 @@ impl Synthesize {
         answer.notes.seconds(seconds);
         answer
             .notes
-            .line(format!("open {}", self.output.join("report.html").display()));
+            .line(format!("open {}", self.output.name().join("report.html").display()));
         Ok(answer)
     }
 

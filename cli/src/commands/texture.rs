@@ -22,7 +22,7 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::commands::measure::ClassifierFields;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_file;
+use crate::outputs::Output;
 use crate::progress::{Step, go_on, stopped};
 use crate::values::{Extent, count};
 use crate::warnings::Warning;
@@ -55,7 +55,7 @@ pub struct Texture {
     pub mode: Option<Mode>,
     /// File to write; its extension selects the format
     #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    pub output: Output,
 }
 
 /// How to synthesise.
@@ -235,7 +235,10 @@ impl Texture {
                 "an image is synthesised from one image, a volume from up to three",
             ));
         }
-        check_file(&self.output, everywhere.force)?;
+        let file = match target {
+            Target::Picture(_) => everywhere.outputs.file(&self.output)?,
+            Target::Volume(_, format) => everywhere.outputs.volume(&self.output, format)?,
+        };
         let pictures = self
             .images
             .iter()
@@ -252,7 +255,7 @@ impl Texture {
             }
             step.at(done)
         };
-        let made = self.synthesize(target, &samples, &options, &watch, everywhere)?;
+        let made = self.synthesize((target, &file), &samples, &options, &watch, everywhere)?;
         let notes = self.notes(&made, mode);
         let Made { shape, report, limits } = made;
         let fields = TextureFields {
@@ -273,7 +276,7 @@ impl Texture {
     /// Synthesises and writes the texture.
     fn synthesize(
         &self,
-        target: Target,
+        (target, file): (Target, &Path),
         samples: &[Array3<f32>],
         options: &TextureOptions,
         watch: Watch<'_>,
@@ -285,7 +288,7 @@ impl Texture {
                 let (made, report) =
                     synthesize_image_with_report(&exemplars[0], size, options, watch).at(&self.images[0])?;
                 go_on()?;
-                write_picture(&self.output, &made)?;
+                write_picture(file, &made)?;
                 let limits = image_texture_limits(samples[0].view(), made.view(), everywhere.seed);
                 Made {
                     shape: made.shape().to_vec(),
@@ -303,7 +306,7 @@ impl Texture {
                 go_on()?;
                 let (nz, ny, nx, channels) = made.dim();
                 write_volume::<u8>(
-                    &self.output,
+                    file,
                     format,
                     VolumeShape { nz, ny, nx, channels },
                     VoxelSize {
@@ -319,7 +322,7 @@ impl Texture {
                         }
                     },
                 )
-                .at(&self.output)?;
+                .at(file)?;
                 let views: Vec<_> = samples.iter().map(|samples| samples.view()).collect();
                 let limits = texture_limits(&views, made.view(), report.final_error, everywhere.seed);
                 Made {
@@ -398,10 +401,13 @@ impl Texture {
         match (&self.size.0[..], is_picture) {
             (&[n], true) => Ok(Target::Picture([n, n])),
             (&[height, width], true) => Ok(Target::Picture([height, width])),
-            (&[n], false) => Ok(Target::Volume([n; 3], Format::from_path(&self.output).or_usage("-o")?)),
+            (&[n], false) => Ok(Target::Volume(
+                [n; 3],
+                Format::from_path(self.output.name()).or_usage("-o")?,
+            )),
             (&[nz, ny, nx], false) => Ok(Target::Volume(
                 [nz, ny, nx],
-                Format::from_path(&self.output).or_usage("-o")?,
+                Format::from_path(self.output.name()).or_usage("-o")?,
             )),
             (&[_, _], false) => wrong("H,W gives an image, so the file must end in .png"),
             _ => wrong("NZ,NY,NX gives a volume, so the file must end in .npy, .nrrd, .vti, .tif, .h5 or .zarr"),

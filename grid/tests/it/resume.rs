@@ -1,20 +1,13 @@
 //! A resumed volume equals the volume written without interruption, byte for byte.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use proptest::prelude::*;
 use stereology_grid::{Element, Format, GridError, VolumeShape, resume_volume, write_volume};
 
-/// Every file of a folder or the one file, by name.
-fn contents(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    match fs::read_dir(path) {
-        Ok(entries) => entries.flat_map(|entry| contents(&entry.unwrap().path())).collect(),
-        Err(_) => BTreeMap::from([(path.to_owned(), fs::read(path).unwrap())]),
-    }
-}
+use crate::contents;
 
 /// Writes a volume of `sample`, cancelled before the slab `end`, and returns which slabs were requested.
 fn write<T: Element>(

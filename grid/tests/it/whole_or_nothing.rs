@@ -3,7 +3,9 @@
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
-use stereology_grid::{Format, GridError, VolumeShape, write_atomically, write_volume};
+use stereology_grid::{Format, GridError, VolumeShape, resume_volume, write_atomically, write_volume};
+
+use crate::contents;
 
 const SHAPE: VolumeShape = VolumeShape {
     nz: 5,
@@ -23,13 +25,153 @@ fn the_name_appears_with_the_last_slab() {
     let folder = tempfile::tempdir().unwrap();
     for format in Format::ALL {
         let file = folder.path().join(format!("v{format}"));
-        let partial = folder.path().join(format!("v{format}.partial"));
         write_volume::<u8>(&file, format, SHAPE, [1.0; 3], |_, _| {
-            assert!(!file.exists() && partial.exists());
+            assert!(!file.exists());
             ControlFlow::Continue(())
         })
         .unwrap();
-        assert!(file.exists() && !partial.exists());
+        assert!(file.exists());
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), Format::ALL.len());
+}
+
+/// Names that look temporary, or like what a replaced output was once called, can be anyone's.
+#[test]
+fn files_of_others_beside_an_output_are_left_alone() {
+    for format in Format::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(format!("v{format}"));
+        let others = [".partial", ".old", ".partial-old"].map(|end| folder.path().join(format!("v{format}{end}")));
+        for other in &others {
+            fs::create_dir(other).unwrap();
+            fs::write(other.join("thesis"), "years of work").unwrap();
+        }
+        for spacing in [1.0, 2.0] {
+            zeros(&file, format, SHAPE, [spacing; 3]).unwrap();
+        }
+        for other in &others {
+            assert_eq!(fs::read_to_string(other.join("thesis")).unwrap(), "years of work");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+    }
+}
+
+#[test]
+fn names_of_255_bytes_can_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in Format::ALL {
+        let ending = format.to_string();
+        let name = format!("{}{ending}", "ä".repeat((255 - ending.len()) / 2));
+        zeros(&folder.path().join(&name), format, SHAPE, [1.0; 3]).unwrap();
+        assert!(folder.path().join(&name).exists());
+        fs::rename(folder.path().join(&name), folder.path().join("aside")).unwrap();
+        let resumed = folder.path().join(&name);
+        resume_volume::<u8>(&resumed, format, SHAPE, [1.0; 3], |_, _| ControlFlow::Continue(())).unwrap();
+        assert!(resumed.exists());
+        let aside = folder.path().join("aside");
+        if aside.is_dir() {
+            fs::remove_dir_all(aside).unwrap()
+        } else {
+            fs::remove_file(aside).unwrap()
+        }
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), Format::ALL.len());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_is_followed_and_stays() {
+    for format in Format::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let (link, target) = (
+            folder.path().join(format!("link{format}")),
+            folder.path().join("deep/v"),
+        );
+        fs::create_dir(folder.path().join("deep")).unwrap();
+        std::os::unix::fs::symlink("deep/v", &link).unwrap();
+        for spacing in [1.0, 2.0] {
+            zeros(&link, format, SHAPE, [spacing; 3]).unwrap();
+            assert!(link.is_symlink() && target.exists() && !target.is_symlink());
+        }
+    }
+}
+
+/// Each of several writers of one name leaves a whole output, and a resumable one has a single writer.
+#[test]
+fn outputs_of_several_writers_are_never_mixed() {
+    for format in Format::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(format!("v{format}"));
+        std::thread::scope(|scope| {
+            for value in 1..=4_u8 {
+                let file = &file;
+                scope.spawn(move || {
+                    let shape = VolumeShape { nz: 70, ..SHAPE };
+                    let _ = write_volume::<u8>(file, format, shape, [1.0; 3], |_, mut slab| {
+                        slab.fill(value);
+                        ControlFlow::Continue(())
+                    });
+                });
+            }
+        });
+        let bytes = |path: &Path| contents(path).into_values().collect::<Vec<_>>();
+        let there = bytes(&file);
+        let same = (1..=4_u8).any(|value| {
+            let alone = folder.path().join(format!("alone-{value}{format}"));
+            let shape = VolumeShape { nz: 70, ..SHAPE };
+            write_volume::<u8>(&alone, format, shape, [1.0; 3], |_, mut slab| {
+                slab.fill(value);
+                ControlFlow::Continue(())
+            })
+            .unwrap();
+            bytes(&alone) == there
+        });
+        assert!(same, "{format}");
+    }
+}
+
+#[test]
+fn a_resumable_volume_has_one_writer() {
+    for format in Format::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(format!("v{format}"));
+        let mut seconds = Vec::new();
+        resume_volume::<u8>(&file, format, SHAPE, [1.0; 3], |z, _| {
+            if z == 2 {
+                seconds.push(resume_volume::<u8>(&file, format, SHAPE, [1.0; 3], |_, _| {
+                    ControlFlow::Continue(())
+                }));
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert!(
+            matches!(seconds[..], [Err(GridError::InUse { .. })]),
+            "{format}: {seconds:?}"
+        );
+    }
+}
+
+#[test]
+fn a_partial_file_of_someone_else_is_not_resumed() {
+    for format in Format::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(format!("v{format}"));
+        let partial = folder.path().join(format!("v{format}.partial"));
+        let thesis = if format == Format::Zarr {
+            fs::create_dir(&partial).unwrap();
+            partial.join("thesis")
+        } else {
+            partial
+        };
+        fs::write(&thesis, "years of work").unwrap();
+        let refused = resume_volume::<u8>(&file, format, SHAPE, [1.0; 3], |_, _| ControlFlow::Continue(()));
+        assert!(
+            matches!(refused, Err(GridError::OtherPartial { .. })),
+            "{format}: {refused:?}"
+        );
+        assert_eq!(fs::read_to_string(&thesis).unwrap(), "years of work");
+        assert!(!file.exists());
     }
 }
 
@@ -79,12 +221,12 @@ fn a_folder_appears_whole_or_not_at_all() {
 fn what_cannot_be_written_ends_the_work() {
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("v.zarr");
-    let in_the_way = place.path().join("v.zarr.partial/0/c");
     let shape = VolumeShape { nz: 1000, ..SHAPE };
     let mut asked = 0;
     let failed = write_volume::<u8>(&path, Format::Zarr, shape, [1.0; 3], |z, _| {
         if z == 3 {
-            fs::write(&in_the_way, "a file where a folder is wanted").unwrap();
+            let staged = fs::read_dir(place.path()).unwrap().next().unwrap().unwrap().path();
+            fs::write(staged.join("content.zarr/0/c"), "a file where a folder is wanted").unwrap();
         }
         asked += 1;
         ControlFlow::Continue(())

@@ -1,8 +1,9 @@
 //! Reading and writing mesh files: OBJ, STL (text and binary) and PLY (text and binary), in double precision.
 
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
+
+use tempfile::NamedTempFile;
 
 use crate::file::mesh_file_error::MeshFileError;
 use crate::file::obj;
@@ -108,7 +109,7 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshFileError> 
 }
 
 /// Writes triangles as a mesh file; the extension determines the format. An existing file is replaced only by a
-/// complete one: the new file is written beside it as `FILE.partial` and renamed.
+/// complete one: the new file is written beside it under a temporary name and renamed.
 ///
 /// OBJ and PLY keep every bit of the positions; STL holds them in single precision.
 ///
@@ -137,28 +138,31 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), Mes
     })
 }
 
-/// Writes `FILE.partial` and renames it when it is complete.
+/// Writes a temporary file beside `path` and renames it when it is complete.
 pub(crate) fn write_whole(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> std::io::Result<()>,
 ) -> Result<(), MeshFileError> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
     let write = || {
-        let mut out = BufWriter::new(File::create(&partial)?);
+        // The target of a link is replaced, and the link stays.
+        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = match target.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".mesh.partial-");
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // as of any new file, less the umask
+        let mut out = BufWriter::new(builder.tempfile_in(folder)?);
         write(&mut out)?;
-        out.into_inner()
-            .map_err(std::io::IntoInnerError::into_error)?
-            .sync_all()?;
-        std::fs::rename(&partial, path)
+        let whole = out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+        whole.as_file().sync_all()?;
+        whole.persist(&target).map(drop).map_err(|error| error.error)
     };
-    write().map_err(|source| {
-        // A failure of the removal cannot be reported.
-        let _ = std::fs::remove_file(&partial);
-        MeshFileError::Write {
-            path: path.to_owned(),
-            source,
-        }
+    write().map_err(|source| MeshFileError::Write {
+        path: path.to_owned(),
+        source,
     })
 }
 

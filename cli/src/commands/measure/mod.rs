@@ -21,7 +21,7 @@ use stereology::spectrum::BandPass;
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::{check_file, write_text};
+use crate::outputs::{Output, write_text};
 use crate::progress::{Step, go_on};
 use crate::values::{count, pair, positive};
 use crate::warnings::Warning;
@@ -72,7 +72,7 @@ pub struct Measure {
     pub mask: Option<PathBuf>,
     /// Also write a page with all curves and images (HTML)
     #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    pub report: Option<Output>,
 }
 
 /// Families of slices, `xz,yz`.
@@ -226,9 +226,11 @@ impl Fields for MeasureFields {
 
 impl Measure {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        if let Some(report) = &self.report {
-            check_file(report, everywhere.force)?;
-        }
+        let report_file = self
+            .report
+            .as_ref()
+            .map(|output| everywhere.outputs.file(output))
+            .transpose()?;
         let mut notes = Notes::default();
         let exemplar = read(&self.exemplar, self.exemplar_range, "--exemplar-range")?;
         let volume = read(&self.volume, self.range, "--range")?;
@@ -281,7 +283,7 @@ impl Measure {
         if let Some(path) = &self.sources {
             fields.copying = Some(self.copying(&mut notes, path, &exemplar.values, &volume.values)?);
         }
-        if let Some(path) = &self.report {
+        if let Some(path) = &report_file {
             let middle = |pictures: &[ArrayView3<'_, f32>]| pictures.get(pictures.len() / 2).map(picture);
             let shown = self.slices.0.iter().filter_map(|&family| {
                 let of = sections(volume.values.view(), family);

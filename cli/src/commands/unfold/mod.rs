@@ -22,7 +22,7 @@ use stereology::unfold::{Estimate, Fractions, Interval, LikelyParameter, Resampl
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
-use crate::outputs::check_file;
+use crate::outputs::Output;
 use crate::progress::{Step, go_on};
 use crate::values::{Window, count, positive, size_error};
 use stereology_report::{percent, significant};
@@ -99,7 +99,7 @@ pub struct Unfold {
     pub unknown_fractions: bool,
     /// Also write the densities as a table: lower_edge,upper_edge,number_density,lower,upper,type,category
     #[arg(short, long, value_name = "densities.csv")]
-    pub output: Option<PathBuf>,
+    pub output: Option<Output>,
 }
 
 /// A column of the table; empty if it is missing.
@@ -214,9 +214,11 @@ impl Fields for UnfoldFields {
 
 impl Unfold {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        if let Some(output) = &self.output {
-            check_file(output, everywhere.force)?;
-        }
+        let output = &self.output;
+        let output = output
+            .as_ref()
+            .map(|output| everywhere.outputs.file(output))
+            .transpose()?;
         let input = Input::read(&self.profiles)?;
         let unit = input.unit(everywhere)?;
         let stated = input.head.min_size;
@@ -235,7 +237,7 @@ impl Unfold {
             .map_err(|error| self.failure(&error))?;
         drop(step);
         go_on()?;
-        if let Some(output) = &self.output {
+        if let Some(output) = &output {
             densities::write(output, &found, unit).at(output)?;
         }
         self.answer(&found, remarks, unit)

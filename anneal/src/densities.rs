@@ -37,7 +37,7 @@ pub enum SizeInBin {
 ///
 /// # Errors
 ///
-/// [`PopulationError::Volume`]; [`PopulationError::TooMany`] above 10⁸; [`PopulationError::Histogram`] for densities
+/// [`PopulationError::Volume`]; [`PopulationError::TooMany`] above 10⁶; [`PopulationError::Histogram`] for densities
 /// that are negative or not finite.
 ///
 /// ```
@@ -98,6 +98,10 @@ pub fn grains_from_densities(
     size_in_bin: SizeInBin,
     seed: u64,
 ) -> Result<Vec<Grain>, PopulationError> {
+    let total = volume * densities.iter().flat_map(|of| of.number_density).sum::<f64>();
+    if total > MOST {
+        return Err(PopulationError::TooMany(total));
+    }
     let mut grains = Vec::new();
     for (histogram, of) in densities.iter().enumerate() {
         let wrong = PopulationError::Histogram {

@@ -65,8 +65,8 @@ pub enum PopulationError {
         /// Number of its densities.
         densities: usize,
     },
-    /// There would be more than 10⁸ particles.
-    #[error("{0:.3e} particles are too many: use a smaller box or omit the finest sizes")]
+    /// There would be more than 10⁶ particles.
+    #[error("{0:.3e} particles are too many, at most a million are packed: use a smaller box or omit the finest sizes")]
     TooMany(f64),
 }
 
@@ -248,7 +248,7 @@ pub fn scale_to_fraction(
 ///
 /// # Errors
 ///
-/// As [`box_for_fraction`], and [`PopulationError::TooMany`] above 10⁸.
+/// As [`box_for_fraction`], and [`PopulationError::TooMany`] above 10⁶.
 ///
 /// # Examples
 ///
@@ -278,7 +278,7 @@ pub fn count_to_fill(
 }
 
 /// Larger numbers of particles are refused before memory is allocated.
-pub(crate) const MOST: f64 = 1e8;
+pub(crate) const MOST: f64 = 1e6;
 
 fn checked(fraction: f64) -> Result<f64, PopulationError> {
     if fraction > 0.0 && fraction < 1.0 {

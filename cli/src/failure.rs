@@ -1,11 +1,12 @@
 //! Errors of the program: one message (what failed, where, what to do) and an exit code.
 
+use std::ffi::OsStr;
 use std::fmt::{self, Display};
 use std::path::Path;
 
-use stereology::shape::{Body, BodyError};
+use stereology::shape::{Body, BodyError, ClosedMesh, read_mesh};
 
-use crate::progress;
+use crate::signals;
 
 /// Why a command failed, and the exit code of the program.
 #[derive(Debug)]
@@ -34,7 +35,7 @@ impl Failure {
     /// Interrupted: exit 128 plus the number of the signal, 130 for Ctrl-C, as shells expect.
     pub fn stopped() -> Self {
         Self {
-            code: progress::code_of_signal(),
+            code: signals::exit_code(),
             message: "interrupted; no output was changed".to_owned(),
         }
     }
@@ -64,8 +65,21 @@ pub fn body(spec: &str) -> Result<Body, Failure> {
     body_welding(spec, None)
 }
 
-/// [`body`], with vertices of a mesh file merged that are closer than `weld`.
-pub fn body_welding(spec: &str, weld: Option<f64>) -> Result<Body, Failure> {
+/// [`body`], whose description need not be text if it is the name of a mesh file.
+///
+/// Vertices of a mesh file that are closer than `weld` are merged.
+pub fn body_of(spec: &OsStr, weld: Option<f64>) -> Result<Body, Failure> {
+    let Some(text) = spec.to_str() else {
+        let path = Path::new(spec);
+        let mesh = read_mesh(path).at(path)?;
+        return ClosedMesh::welded_within(mesh, weld.unwrap_or(0.0))
+            .map(Body::from_mesh)
+            .at(path);
+    };
+    body_welding(text, weld)
+}
+
+fn body_welding(spec: &str, weld: Option<f64>) -> Result<Body, Failure> {
     Body::parse_welding(spec, weld.unwrap_or(0.0)).map_err(|error| match error {
         BodyError::Length { .. }
         | BodyError::Numbers { .. }

@@ -13,6 +13,7 @@ mod particle_files;
 mod particle_surfaces;
 mod program;
 mod progress;
+mod signals;
 mod values;
 mod warnings;
 
@@ -47,7 +48,7 @@ fn main() -> ExitCode {
     match done {
         Ok(code) => code,
         Err(failure) => {
-            let failure = if progress::stopped() {
+            let failure = if signals::stopped() {
                 Failure::stopped()
             } else {
                 failure
@@ -83,7 +84,7 @@ fn outputs_of(matches: &ArgMatches, program: &Program) -> Result<Outputs, Failur
 
 fn run(program: &Program) -> Result<ExitCode, Failure> {
     let everywhere = &program.everywhere;
-    progress::stop_on_signals(everywhere.outputs.clone());
+    signals::stop_on_signals(everywhere.outputs.abandoning());
     everywhere.start_threads()?;
     if matches!(program.command, Command::Manual) {
         print(&manual::page())?;

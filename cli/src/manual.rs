@@ -22,6 +22,7 @@ only the proportions of a shape, not its size.
 fastest; `.tif` with one RGB page per z; `.h5` in the layout of DREAM.3D; `.zarr` as OME-Zarr 0.5 with axes (channel, z, y, x).
 - `--json` prints one JSON object. Its first key is `schema`, with the value `stereology.<command>/1`; `warnings` is a list of `{code, message}` (the codes \
 are listed below). The folder `schema` holds a JSON Schema of every command's object; `stereology schema COMMAND` prints it.
+- A folder of results contains the list of its files, `.stereology-files`. `--force` replaces only folders in which every file is in that list.
 - Colours are averaged as stored, as sRGB-encoded values / 255, as in the paper.";
 
 /// The whole page in Markdown.

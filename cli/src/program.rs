@@ -39,8 +39,8 @@ const STYLES: Styles = Styles::styled()
     styles = STYLES,
     verbatim_doc_comment,
     disable_help_subcommand = true,
-    after_long_help = "Exit codes: 0 success; 1 the data are unsuitable or the run failed; 2 wrong usage; 3 success with warnings, under --strict; 130 interrupted by Ctrl-C.\n\
-                       Outputs are written under a temporary name and renamed when complete. Existing outputs are replaced only with --force.\n\
+    after_long_help = "Exit codes: 0 success; 1 the data are unsuitable or the run failed; 2 wrong usage; 3 success with warnings, under --strict; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.\n\
+                       Outputs are written under temporary names and renamed together when all are complete. Existing outputs are replaced only with --force, and a folder only if this program wrote all that is in it. An output is never an input, and links are followed.\n\
                        docs/cli.md contains the help of all commands and the meaning of every warning."
 )]
 pub struct Program {

@@ -1,81 +1,16 @@
-//! Progress bars on a terminal, and signals that stop the program.
+//! Progress bars on a terminal.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::failure::Failure;
-use crate::outputs::Outputs;
+use crate::signals::stopped;
 
-/// Number of the signal that stops the program; 0 before it.
-static SIGNAL: AtomicU8 = AtomicU8::new(0);
-
-/// Ctrl-C.
-const INTERRUPT: u8 = 2;
-
-/// Time for the running step to stop by itself, before the program ends without it.
-const GRACE: Duration = Duration::from_millis(500);
-
-/// Makes Ctrl-C, SIGTERM and SIGHUP stop the running step. If it does not stop soon, or there is a second signal, the
-/// outputs are abandoned and the program ends.
-#[cfg(unix)]
-pub fn stop_on_signals(outputs: Outputs) {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-
-    let wanted = [SIGINT, SIGTERM, SIGHUP];
-    let wanted = wanted
-        .into_iter()
-        .filter(|&signal| signal != SIGHUP || !is_ignored(signal));
-    // Without a handler a signal ends the program at once. That is safe too, because outputs are renamed only when
-    // complete, but it leaves temporary files.
-    let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else {
-        return;
-    };
-    std::thread::spawn(move || {
-        let Some(signal) = signals.forever().next() else {
-            return;
-        };
-        SIGNAL.store(u8::try_from(signal).unwrap_or(INTERRUPT), Ordering::SeqCst);
-        let since = Instant::now();
-        while since.elapsed() < GRACE && signals.pending().next().is_none() {
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        let _ = writeln!(io::stderr(), "error: {}", Failure::stopped());
-        outputs.abandon(i32::from(code_of_signal()));
-    });
-}
-
-/// Programs started with `nohup` ignore SIGHUP, and go on doing so.
-#[cfg(unix)]
-fn is_ignored(signal: i32) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
-}
-
-/// Signals end the program at once. That is safe, because outputs are renamed only when complete.
-#[cfg(not(unix))]
-pub fn stop_on_signals(_: Outputs) {}
-
-/// Was the program told to stop?
-pub fn stopped() -> bool {
-    SIGNAL.load(Ordering::SeqCst) != 0
-}
-
-/// Exit code of a program that a signal stopped.
-pub fn code_of_signal() -> u8 {
-    match SIGNAL.load(Ordering::SeqCst) {
-        0 => 128 + INTERRUPT,
-        signal => 128 + signal,
-    }
-}
-
-/// An error if the program was told to stop; called before outputs get their final names.
+/// An error if a signal has stopped the program; called before outputs get their final names.
 pub fn go_on() -> Result<(), Failure> {
     if stopped() { Err(Failure::stopped()) } else { Ok(()) }
 }

@@ -13,6 +13,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Bytes of a number of GiB.
+pub fn bytes(gib: f64) -> u64 {
+    (gib * f64::from(1 << 30)) as u64
+}
+
 /// The length of a pixel, with its unit if it is given: `0.05` or `0.05mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLength {

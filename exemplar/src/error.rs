@@ -84,6 +84,19 @@ pub enum SolidError {
         /// Voxels along z, y, x.
         size: [usize; 3],
     },
+    /// The solid needs too much memory.
+    #[error(
+        "a solid of (x, y, z) = {} x {} x {} voxels needs about {bytes} bytes of memory, the limit is {limit}: use fewer voxels or raise the limit",
+        .size[2], .size[1], .size[0]
+    )]
+    Memory {
+        /// Voxels along z, y, x.
+        size: [usize; 3],
+        /// Bytes needed.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
     /// No voxel lies inside the mask.
     #[error("the mask contains no voxel: nothing can be made inside it")]
     EmptyMask,

@@ -144,7 +144,8 @@ impl Exemplar {
     }
 
     /// Channels that are compared: colours or indicators, and features.
-    pub(crate) fn channels(&self) -> usize {
+    #[must_use]
+    pub fn channels(&self) -> usize {
         self.planes.len() / (self.height * self.width)
     }
 

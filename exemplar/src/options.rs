@@ -1,5 +1,7 @@
 //! Options of the synthesis.
 
+use crate::error::SolidError;
+
 use crate::scan::Scan;
 
 /// The method of synthesis.
@@ -96,6 +98,8 @@ pub struct SolidOptions {
     pub similar: Option<usize>,
     /// Seed of the random numbers.
     pub seed: u64,
+    /// Bytes that a synthesis may need; larger solids are refused.
+    pub memory_limit: u64,
 }
 
 impl Default for SolidOptions {
@@ -112,11 +116,37 @@ impl Default for SolidOptions {
             iterations: 10,
             similar: None,
             seed: 0,
+            memory_limit: 4 << 30,
         }
     }
 }
 
 impl SolidOptions {
+    /// Whether a solid of `size` (nz, ny, nx) with `channels` values per voxel (colours, or the number of phases) can
+    /// be made within [`memory_limit`](Self::memory_limit).
+    ///
+    /// # Errors
+    ///
+    /// [`SolidError::Memory`].
+    pub fn check_memory(&self, size: [usize; 3], channels: usize) -> Result<(), SolidError> {
+        let voxels = size.iter().fold(1_u64, |all, &n| all.saturating_mul(n as u64));
+        // The value and the sum of each channel; pixels, energies, tallies and the mask. Measured: 37 bytes of a voxel
+        // with three colours.
+        let bytes = voxels.saturating_mul(16 + 8 * channels as u64);
+        if bytes <= self.memory_limit {
+            return Ok(());
+        }
+        let limit = self.memory_limit;
+        Err(SolidError::Memory { size, bytes, limit })
+    }
+
+    /// With another limit of memory, in bytes.
+    #[must_use]
+    pub fn with_memory_limit(mut self, bytes: u64) -> Self {
+        self.memory_limit = bytes;
+        self
+    }
+
     /// With another method.
     #[must_use]
     pub fn with_method(mut self, method: Method) -> Self {

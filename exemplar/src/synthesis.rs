@@ -328,6 +328,7 @@ fn check(exemplars: &[Exemplar], domain: &Domain, options: &SolidOptions) -> Res
         });
     }
     let first = &exemplars[0];
+    options.check_memory(domain.size(), first.channels())?;
     for other in &exemplars[1..] {
         if (other.channels(), other.colours()) != (first.channels(), first.colours()) {
             return Err(SolidError::Mismatch {

@@ -13,8 +13,8 @@ const BUFFER: usize = 1 << 16;
 /// Writes a file that appears under its name only when it is complete.
 ///
 /// `write` fills a temporary file in the same folder, which is then renamed and replaces any file of that name. If
-/// `path` is a symbolic link, the file that it leads to is replaced. The temporary name `NAME.partial-PROCESS-RANDOM` is
-/// new, so neither another process nor a file of another program is in the way. If `write` or the system fails, the
+/// `path` is a symbolic link, the file that it leads to is replaced. The temporary name `NAME.partial-PROCESS-RANDOM`
+/// is new, so neither another process nor a file of another program is in the way. If `write` or the system fails, the
 /// temporary file is removed and an older file stays unchanged; a killed process may leave it. The bytes are passed to
 /// the operating system; no sync to disk is forced.
 ///

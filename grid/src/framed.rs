@@ -38,8 +38,8 @@ pub(crate) fn write<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> Control
     file.publish()
 }
 
-/// Number of complete slabs in `FILE.partial`. What it holds must equal ours: its head, its first slab as far as it goes,
-/// and its last complete slab.
+/// Number of complete slabs in `FILE.partial`. What it holds must equal ours: its head, its first slab as far as it
+/// goes, and its last complete slab.
 fn whole_slabs<T: Element, F: FnMut(usize, ArrayViewMut3<'_, T>) -> ControlFlow<()>>(
     path: &Path,
     file: &mut PartialFile,

@@ -62,8 +62,8 @@ pub fn write_volume<T: Element>(
 ///
 /// # Errors
 ///
-/// As [`write_volume`]; [`GridError::OtherPartial`] if `FILE.partial` is anything but the beginning of this volume, which
-/// is left as it is; [`GridError::InUse`] if another process is writing it.
+/// As [`write_volume`]; [`GridError::OtherPartial`] if `FILE.partial` is anything but the beginning of this volume,
+/// which is left as it is; [`GridError::InUse`] if another process is writing it.
 ///
 /// # Examples
 ///

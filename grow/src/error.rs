@@ -87,6 +87,19 @@ pub enum GrowError {
     /// More voxels or samples than 32 bits can number.
     #[error("the box has 4,294,967,295 voxels or more, or the exemplar that many samples; use a lower resolution")]
     TooLarge,
+    /// The box needs too much memory.
+    #[error(
+        "a box of (x, y, z) = {} x {} x {} voxels needs about {bytes} bytes of memory, the limit is {limit}: use a lower resolution or raise the limit",
+        .size[2], .size[1], .size[0]
+    )]
+    Memory {
+        /// Voxels along z, y, x.
+        size: [usize; 3],
+        /// Bytes needed.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
     /// Neither seeds nor measurements.
     #[error("there is no seed: give measurements, or at least one seed")]
     NoSeeds,

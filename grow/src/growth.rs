@@ -96,6 +96,8 @@ pub fn grow(
     if mask.len() >= MOST {
         return Err(GrowError::TooLarge);
     }
+    let (nz, ny, nx) = mask.dim();
+    options.check_memory([nz, ny, nx], inside, exemplar.dim().2)?;
     let fixed = checked(mask, exemplar.dim().2, measured)?;
     if fixed.is_empty() && options.seeds == 0 {
         return Err(GrowError::NoSeeds);

@@ -1,5 +1,6 @@
 //! How a solid is grown.
 
+use crate::error::GrowError;
 use crate::planes::Planes;
 use crate::search::Search;
 
@@ -19,6 +20,8 @@ pub struct GrowOptions {
     pub tolerance: f32,
     /// Seed of the random numbers.
     pub seed: u64,
+    /// Bytes that growing may need; larger solids are refused.
+    pub memory_limit: u64,
 }
 
 impl Default for GrowOptions {
@@ -31,11 +34,41 @@ impl Default for GrowOptions {
             search: Search::default(),
             tolerance: 0.1,
             seed: 0,
+            memory_limit: 4 << 30,
         }
     }
 }
 
 impl GrowOptions {
+    /// Whether a box of `size` (nz, ny, nx) with `channels` values per voxel can be grown within
+    /// [`memory_limit`](Self::memory_limit), if `inside` of its voxels are inside the mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`GrowError::Memory`].
+    pub fn check_memory(&self, size: [usize; 3], inside: usize, channels: usize) -> Result<(), GrowError> {
+        let voxels = size.iter().fold(1_u64, |all, &n| all.saturating_mul(n as u64));
+        // The values and their stored form, labels, sources and the mask; the order in which voxels are filled.
+        // Measured: 55 bytes of a voxel with three channels, all inside.
+        let bytes = voxels
+            .saturating_mul(16 + 5 * channels as u64)
+            .saturating_add(24 * inside as u64);
+        if bytes <= self.memory_limit {
+            return Ok(());
+        }
+        let limit = self.memory_limit;
+        Err(GrowError::Memory { size, bytes, limit })
+    }
+
+    /// With another limit of memory, in bytes.
+    #[must_use]
+    pub fn with_memory_limit(self, bytes: u64) -> Self {
+        Self {
+            memory_limit: bytes,
+            ..self
+        }
+    }
+
     /// With another window.
     #[must_use]
     pub fn with_window(self, window: usize) -> Self {

@@ -46,14 +46,9 @@ impl Voxels {
         reason = "at most the resolution"
     )]
     pub fn of_mesh(mesh: &ClosedMesh, resolution: usize) -> Result<Self, GrowError> {
-        if !(1..=2048).contains(&resolution) {
-            return Err(GrowError::Resolution { resolution });
-        }
+        Self::size_of(mesh, resolution)?;
         let (low, high) = mesh.as_triangle_mesh().bounding_box().ok_or(GrowError::EmptyMask)?;
-        let sides = high - low;
-        let spacing = sides.max() / resolution as f64;
-        // Rounding must not add a voxel to a side that is a whole number of voxels.
-        let counts = sides.map(|side| (side / spacing - 1e-9).ceil().clamp(1.0, resolution as f64));
+        let (counts, spacing) = counts_along(&(high - low), resolution);
         let origin = nalgebra::center(&low, &high) - counts * (spacing / 2.0);
         let [nx, ny, nz] = [counts.x as usize, counts.y as usize, counts.z as usize];
         let test = InsideTest::new(mesh);
@@ -76,6 +71,25 @@ impl Voxels {
             origin,
             spacing,
         })
+    }
+
+    /// Voxels along z, y and x of [`of_mesh`](Self::of_mesh), without finding out which are inside.
+    ///
+    /// # Errors
+    ///
+    /// [`GrowError::Resolution`]; [`GrowError::EmptyMask`] for a mesh without vertices.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most the resolution"
+    )]
+    pub fn size_of(mesh: &ClosedMesh, resolution: usize) -> Result<[usize; 3], GrowError> {
+        if !(1..=2048).contains(&resolution) {
+            return Err(GrowError::Resolution { resolution });
+        }
+        let (low, high) = mesh.as_triangle_mesh().bounding_box().ok_or(GrowError::EmptyMask)?;
+        let (counts, _) = counts_along(&(high - low), resolution);
+        Ok([counts.z, counts.y, counts.x].map(|count| count as usize))
     }
 
     /// The voxel (z, y, x) that contains a point, inside the mesh or not; `None` outside the box.
@@ -121,4 +135,12 @@ impl Voxels {
         }
         best
     }
+}
+
+/// Voxels along x, y and z, and their side.
+fn counts_along(sides: &Vector3<f64>, resolution: usize) -> (Vector3<f64>, f64) {
+    let spacing = sides.max() / resolution as f64;
+    // Rounding must not add a voxel to a side that is a whole number of voxels.
+    let counts = sides.map(|side| (side / spacing - 1e-9).ceil().clamp(1.0, resolution as f64));
+    (counts, spacing)
 }

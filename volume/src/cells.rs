@@ -206,16 +206,21 @@ impl Cells {
                 (p[k] - from).min(from + self.cells_per_length[k].recip() - p[k])
             })
             .fold(f64::INFINITY, f64::min);
-        let thinnest = self.cells_per_length.max().recip();
+        // The nearest point of any surface is at most half a period away along each axis.
+        let limits = self.counts.map(|count| count as i64 / 2 + 2);
         let mut nearest = f64::INFINITY;
         let mut seen: Vec<(u32, Vector3<f64>)> = Vec::new();
         for ring in 0.. {
+            let left = (0..3).filter(|&k| ring <= limits[k]);
+            let thinnest = left
+                .map(|k| self.cells_per_length[k].recip())
+                .fold(f64::INFINITY, f64::min);
             // Any particle nearer than this reaches into the rings already visited.
-            if nearest <= to_wall + (f64::from(ring) - 1.0) * thinnest {
+            if nearest <= to_wall + (ring as f64 - 1.0) * thinnest || thinnest.is_infinite() {
                 break;
             }
-            for_ring(ring, |step| {
-                let raw = [0, 1, 2].map(|k| home[k] as i64 + i64::from(step[k]));
+            for_ring(ring, limits, |step| {
+                let raw = [0, 1, 2].map(|k| home[k] as i64 + step[k]);
                 let turns = Vector3::from_fn(|k, _| raw[k].div_euclid(self.counts[k] as i64) as f64);
                 let cell = [0, 1, 2].map(|k| modulo(raw[k], self.counts[k]));
                 let shift = turns.component_mul(&self.sides);
@@ -233,14 +238,15 @@ impl Cells {
     }
 }
 
-/// The cells at Chebyshev distance `ring` from the origin.
-fn for_ring(ring: i32, mut visit: impl FnMut([i32; 3])) {
-    for k in -ring..=ring {
-        for j in -ring..=ring {
-            let on_face = k.abs() == ring || j.abs() == ring;
-            let step = if on_face { 1 } else { 2 * ring as usize };
-            for i in (-ring..=ring).step_by(step.max(1)) {
-                visit([i, j, k]);
+/// The cells at Chebyshev distance `ring` from the origin that are at most `limits` away along each axis.
+fn for_ring(ring: i64, limits: [i64; 3], mut visit: impl FnMut([i64; 3])) {
+    let [along_i, along_j, along_k] = limits.map(|limit| limit.min(ring));
+    for k in -along_k..=along_k {
+        for j in -along_j..=along_j {
+            if k.abs() == ring || j.abs() == ring {
+                (-along_i..=along_i).for_each(|i| visit([i, j, k]));
+            } else if along_i == ring {
+                [-ring, ring].into_iter().for_each(|i| visit([i, j, k]));
             }
         }
     }

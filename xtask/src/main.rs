@@ -1,5 +1,6 @@
 //! `cargo xtask`: checks of the workspace, and the way to its studies.
 
+mod faults;
 mod features;
 mod licence;
 mod policy;
@@ -36,6 +37,15 @@ enum Task {
         #[arg(long)]
         python: Option<PathBuf>,
     },
+    /// Kills and stops the program, lets it race with itself, fills its disk; prints the table of docs/reliability.md
+    Faults {
+        /// Program to test; by default the release build
+        #[arg(long)]
+        program: Option<PathBuf>,
+        /// Repetitions of each test
+        #[arg(long, default_value_t = 4)]
+        rounds: usize,
+    },
     /// Runs all that has to pass before a change lands
     Ci,
     /// Runs the released program on data outside the project and writes the results into the pages under docs/
@@ -66,6 +76,7 @@ fn main() -> Result<()> {
         Task::Features => features::run(),
         Task::Dependencies => policy::run(),
         Task::Readers { python } => readers::run(python.as_deref()),
+        Task::Faults { program, rounds } => faults::run(program.as_deref(), rounds),
         Task::Ci => ci(),
         Task::Acceptance(forwarded) => study("acceptance", &forwarded),
         Task::Sand(forwarded) => study("sand", &forwarded),

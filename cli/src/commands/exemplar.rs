@@ -19,8 +19,9 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::Output;
-use crate::progress::{Step, go_on, stopped};
-use crate::values::{Extent, count};
+use crate::progress::{Step, go_on};
+use crate::signals::stopped;
+use crate::values::{Extent, bytes, count, positive};
 use stereology_report::significant;
 
 /// Synthesises a solid whose slices look like an image, for materials without separate particles
@@ -91,6 +92,9 @@ pub struct Exemplar {
     /// Closed mesh (fitted into the box), SHAPE, or .npy (z, y, x; not 0 inside); voxels outside stay 0
     #[arg(long, value_name = "MESH|NPY")]
     pub mask: Option<PathBuf>,
+    /// Refuse solids that need more memory than this, in bytes times 2^30
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
+    pub memory: f64,
     /// Also write the pixel from which each voxel was copied, u32, row x width + column, counted through all images;
     /// 4294967295 outside the mask
     #[arg(long, value_name = "FILE")]
@@ -230,6 +234,10 @@ impl Exemplar {
         let options = self.options(everywhere.seed);
         let mut notes = Notes::default();
         let mut domain = Domain::new(size).or_usage("--size")?;
+        // Before the mask, which has a byte for each voxel.
+        options
+            .check_memory(size, pictures.exemplars[0].channels())
+            .or_usage("--size, --memory")?;
         if self.open {
             domain = domain.open();
         }
@@ -338,6 +346,7 @@ impl Exemplar {
             .with_neighbourhood(self.neighbourhood)
             .with_causal(self.causal)
             .with_iterations(self.iterations)
+            .with_memory_limit(bytes(self.memory))
             .with_seed(seed);
         options.solver = self.solver.map(|solver| match solver {
             Solver::Sequential => exemplar::Solver::Sequential,

@@ -2,6 +2,7 @@
 
 mod measurements;
 
+use std::ffi::{OsStr, OsString};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,10 +23,11 @@ use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
 use self::measurements::Unit;
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
-use crate::failure::{Explain, Failure, body};
+use crate::failure::{Explain, Failure, body_of};
 use crate::outputs::{Output, write_png};
-use crate::progress::{Step, go_on, stopped};
-use crate::values::count;
+use crate::progress::{Step, go_on};
+use crate::signals::stopped;
+use crate::values::{bytes, count, positive};
 use crate::warnings::Warning;
 use stereology_report::{counted, significant};
 
@@ -46,7 +48,7 @@ use stereology_report::{counted, significant};
 )]
 pub struct Grow {
     /// Closed mesh, SHAPE, or picture:H,W
-    pub mesh: String,
+    pub mesh: OsString,
     /// Image of a section through the stone
     pub image: PathBuf,
     /// Voxels along the mesh's longest side
@@ -81,6 +83,9 @@ pub struct Grow {
     /// Also write the cell of each voxel, u32 from 1; 0 is outside the mesh
     #[arg(long, value_name = "FILE")]
     pub cells: Option<Output>,
+    /// Refuse boxes of voxels that need more memory than this, in bytes times 2^30
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
+    pub memory: f64,
     /// Also write the texel of IMAGE from which each voxel was copied, u32, row x width + column; 4294967295 where
     /// nothing was copied
     #[arg(long, value_name = "FILE")]
@@ -183,7 +188,7 @@ impl Fields for GrowFields {
 
 impl Grow {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        if let Some(size) = self.mesh.strip_prefix("picture:") {
+        if let Some(size) = self.mesh.to_str().and_then(|mesh| mesh.strip_prefix("picture:")) {
             return self.picture(size, everywhere);
         }
         let volume = |option: &str, output: &Output| {
@@ -214,8 +219,13 @@ impl Grow {
         for repair in mesh.repairs() {
             notes.warn(Warning::new("mesh-repaired", repair.to_string()));
         }
-        let voxels = Voxels::of_mesh(&mesh, resolution).at(Path::new(&self.mesh))?;
         let channels = image.samples.dim().2;
+        let size = Voxels::size_of(&mesh, resolution).at(Path::new(&self.mesh))?;
+        // Before the mask, which has a byte for each voxel.
+        self.options(0, 0)
+            .check_memory(size, 0, channels)
+            .or_usage("--resolution, --memory")?;
+        let voxels = Voxels::of_mesh(&mesh, resolution).at(Path::new(&self.mesh))?;
         let measured = match &self.measured {
             None => Vec::new(),
             Some(path) => {
@@ -327,6 +337,7 @@ impl Grow {
                 Way::Tree => Search::default(),
                 Way::Exact => Search::Exact,
             })
+            .with_memory_limit(bytes(self.memory))
             .with_seed(seed)
     }
 
@@ -335,13 +346,14 @@ impl Grow {
         use grow::GrowError as E;
         match error {
             E::Window { .. } => Failure::usage(format!("--window: {error}")),
+            E::Memory { .. } => Failure::usage(format!("--resolution, --memory: {error}")),
             E::NoSeeds => Failure::usage("there is no seed; give --measured CSV, or --seeds K above 0"),
             E::Levels { .. } => Failure::usage(format!("--levels: {error}")),
             E::OutsideMask { .. } | E::Contradicting { .. } | E::Value { .. } => match &self.measured {
                 Some(path) => Failure::run(format!("{}: {error}", path.display())),
                 None => Failure::run(error),
             },
-            E::EmptyMask => Failure::run(format!("{}: {error}", self.mesh)),
+            E::EmptyMask => Failure::run(format!("{}: {error}", self.mesh.display())),
             _ => Failure::run(format!("{}: {error}", self.image.display())),
         }
     }
@@ -479,7 +491,7 @@ fn as_picture(made: &ArrayView3<'_, f32>) -> image::RgbImage {
 }
 
 /// The mesh of a file or a SHAPE; spheres and ellipsoids are triangulated finely.
-pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
+pub fn closed_mesh(spec: &OsStr) -> Result<ClosedMesh, Failure> {
     let path = Path::new(spec);
     let is_file = path
         .extension()
@@ -488,13 +500,14 @@ pub fn closed_mesh(spec: &str) -> Result<ClosedMesh, Failure> {
         return ClosedMesh::try_from(read_mesh(path).at(path)?).at(path);
     }
     let numbers = |prefix: &str| -> Option<Vec<f64>> {
-        spec.strip_prefix(prefix)?
+        spec.to_str()?
+            .strip_prefix(prefix)?
             .split(',')
             .map(|n| n.trim().parse().ok())
             .collect()
     };
     // Checks the numbers, and creates all other shapes.
-    let body: Body = body(spec)?;
+    let body: Body = body_of(spec, None)?;
     if let Some(mesh) = body.mesh() {
         return Ok(mesh.clone());
     }

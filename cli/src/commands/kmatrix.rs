@@ -1,5 +1,7 @@
 //! `stereology kmatrix`: the distribution of the profile sizes of a body.
 
+use std::ffi::OsString;
+
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,7 +13,7 @@ use stereology::shape::Body;
 use crate::answer::{Answer, Fields, Notes};
 use crate::commands::shape::repairs;
 use crate::everywhere::Everywhere;
-use crate::failure::{Explain, Failure, body_welding};
+use crate::failure::{Explain, Failure, body_of};
 use crate::progress::Step;
 use crate::values::{bins, count, positive};
 use crate::warnings::Warning;
@@ -34,7 +36,7 @@ const MOST_SECTIONS: f64 = 2e7;
 #[command(after_long_help = "Example: stereology kmatrix box:1,1,2 --bins 10 --tolerance 0.001 --json")]
 pub struct Kmatrix {
     /// Particle shape: sphere, ellipsoid:A,B,C, box:A,B,C, cylinder:D,L, rock:SEED or a mesh file
-    pub shape: String,
+    pub shape: OsString,
     /// Number of profile bins, and of size bins
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = bins)]
     pub bins: usize,
@@ -165,7 +167,7 @@ impl Fields for KmatrixFields {
 
 impl Kmatrix {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let body = body_welding(&self.shape, self.weld)?;
+        let body = body_of(&self.shape, self.weld)?;
         let law = self.law(&body, everywhere)?;
         let matrix = law.k_matrix(self.bins);
         let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
@@ -179,11 +181,11 @@ impl Kmatrix {
         let mesh = body.mesh();
 
         let mut notes = Notes::default();
-        let repairs = repairs(&self.shape, &body, &mut notes);
+        let repairs = repairs(&self.shape.to_string_lossy(), &body, &mut notes);
         self.warn(&body, &law, &mut notes);
         self.describe(&law, &rows, &mut notes);
         let fields = KmatrixFields {
-            shape: self.shape.clone(),
+            shape: self.shape.display().to_string(),
             triangles: mesh.map(|mesh| mesh.triangles().len()),
             volume: law.volume(),
             surface_area: law.surface_area(),
@@ -272,7 +274,7 @@ impl Kmatrix {
                 "self-intersection",
                 format!(
                     "{}: the number of profiles on sections disagrees with the curvature of the surface; the mesh probably intersects itself",
-                    self.shape
+                    self.shape.display()
                 ),
             ));
         }
@@ -291,7 +293,7 @@ impl Kmatrix {
         notes
             .line(format!(
                 "{}: volume {}, surface area {}",
-                self.shape,
+                self.shape.display(),
                 significant(law.volume()),
                 significant(law.surface_area())
             ))

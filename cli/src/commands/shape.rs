@@ -1,5 +1,7 @@
 //! `stereology shape`: a body as a mesh file.
 
+use std::ffi::OsString;
+
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -7,7 +9,7 @@ use stereology::shape::{Body, BodyKind, ClosedMesh, ControlSphere, MeshFormat, S
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
-use crate::failure::{Explain, Failure, body_welding};
+use crate::failure::{Explain, Failure, body_of};
 use crate::outputs::{Output, write_text};
 use crate::values::positive;
 use crate::warnings::Warning;
@@ -37,7 +39,7 @@ use stereology_report::significant;
 pub struct Shape {
     /// Shape to write
     #[arg(value_name = "SPEC")]
-    pub spec: String,
+    pub spec: OsString,
     /// Mesh file to write: .obj, .ply (double precision), .stl (single precision); or .json for control points
     #[arg(short, long, value_name = "FILE")]
     pub output: Output,
@@ -108,7 +110,7 @@ impl Shape {
         if !wants_control_points {
             MeshFormat::from_path(self.output.name()).or_usage("-o")?;
         }
-        let body = body_welding(&self.spec, self.weld)?;
+        let body = body_of(&self.spec, self.weld)?;
         let written = if wants_control_points {
             write_text(&file, &self.control_points(&body)?.to_json())?;
             None
@@ -139,7 +141,7 @@ impl Shape {
         if times > 0 {
             // Smoothing can make the surface intersect itself.
             ClosedMesh::try_from(fine.clone())
-                .map_err(|error| format!("{}, subdivided: {error}", self.spec))
+                .map_err(|error| format!("{}, subdivided: {error}", self.spec.display()))
                 .or_fail()?;
         }
         Ok(fine)
@@ -152,7 +154,7 @@ impl Shape {
             _ => {
                 return Err(Failure::usage(format!(
                     "{} has no control points: only spheres and ellipsoids are written to .json; give -o a name that ends in .obj, .ply or .stl",
-                    self.spec
+                    self.spec.display()
                 )));
             }
         };
@@ -166,7 +168,7 @@ impl Shape {
     fn answer(&self, body: &Body, written: Option<&TriangleMesh>) -> Result<Answer, Failure> {
         let mut notes = Notes::default();
         let fields = ShapeFields {
-            shape: self.spec.clone(),
+            shape: self.spec.display().to_string(),
             output: self.output.display().to_string(),
             vertices: written.map(|mesh| mesh.vertices.len()),
             triangles: written.map(|mesh| mesh.triangles.len()),
@@ -177,11 +179,11 @@ impl Shape {
             max_area: body.largest_section_area(),
             size: body.size(),
             convex: body.is_convex(),
-            repairs: repairs(&self.spec, body, &mut notes),
+            repairs: repairs(&self.spec.to_string_lossy(), body, &mut notes),
         };
         notes.line(format!(
             "{}: {} triangles, volume {}, surface area {}, mean caliper {}, size {} -> {}",
-            self.spec,
+            self.spec.display(),
             fields.triangles.unwrap_or(0),
             significant(fields.volume),
             significant(fields.surface_area),

@@ -23,7 +23,8 @@ use crate::commands::measure::ClassifierFields;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::Output;
-use crate::progress::{Step, go_on, stopped};
+use crate::progress::{Step, go_on};
+use crate::signals::stopped;
 use crate::values::{Extent, count};
 use crate::warnings::Warning;
 

@@ -8,7 +8,8 @@ use clap::{ArgMatches, Command};
 use stereology::grid::destination;
 
 use crate::failure::Failure;
-use crate::outputs::{Output, list};
+use crate::outputs::output::Output;
+use crate::outputs::{list, special};
 
 /// The inputs of a run.
 #[derive(Debug, Default)]
@@ -130,8 +131,8 @@ impl Place {
         })
     }
 
-    /// Whether an existing file or folder at `path` is one of the results in this folder. What users have put into it is
-    /// theirs to replace.
+    /// Whether an existing file or folder at `path` is one of the results in this folder. What users have put into it
+    /// is theirs to replace.
     fn has_part(&self, path: &Path) -> bool {
         let Ok(inside) = path.strip_prefix(&self.path) else {
             return false;
@@ -156,7 +157,7 @@ fn refuse_same((name, output): (&str, &Path), (other_name, other): (&str, &Path)
     let (Some(place), Some(there)) = (Place::of(output), Place::of(other)) else {
         return Ok(());
     };
-    if super::special::is_special(output) {
+    if special::is_special(output) {
         return Ok(());
     }
     if place.path == there.path {

@@ -7,15 +7,14 @@
 
 mod collisions;
 mod list;
+mod output;
 mod special;
 
-use std::ffi::OsStr;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use clap::builder::TypedValueParser;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use serde_json::Value;
@@ -23,37 +22,7 @@ use stereology::grid::{Format, Staging, destination, foreign_file_in_zarr, write
 
 use crate::failure::{Explain, Failure};
 use collisions::Inputs;
-
-/// The name of an output on the command line.
-///
-/// It is no path to write to: [`Outputs`] gives that.
-#[derive(Clone, Debug)]
-pub struct Output(PathBuf);
-
-impl Output {
-    /// The name as it was given.
-    pub fn name(&self) -> &Path {
-        &self.0
-    }
-
-    /// The name as text.
-    pub fn display(&self) -> std::path::Display<'_> {
-        self.0.display()
-    }
-
-    /// Extension of the name.
-    pub fn extension(&self) -> Option<&OsStr> {
-        self.0.extension()
-    }
-}
-
-impl clap::builder::ValueParserFactory for Output {
-    type Parser = clap::builder::MapValueParser<clap::builder::PathBufValueParser, fn(PathBuf) -> Self>;
-
-    fn value_parser() -> Self::Parser {
-        clap::builder::PathBufValueParser::new().map(Self)
-    }
-}
+pub use output::Output;
 
 /// All outputs of a run.
 #[derive(Clone, Debug, Default)]
@@ -88,8 +57,8 @@ enum Kind {
 }
 
 impl Outputs {
-    /// The outputs of a command. Refuses, before any work, two options that name one output, and outputs that are inputs
-    /// or contain one, even with `force`.
+    /// The outputs of a command. Refuses, before any work, two options that name one output, and outputs that are
+    /// inputs or contain one, even with `force`.
     pub fn of(command: &clap::Command, given: &clap::ArgMatches, force: bool) -> Result<Self, Failure> {
         let inputs = collisions::check(command, given)?;
         Ok(Self(Arc::new(Mutex::new(State {
@@ -105,8 +74,8 @@ impl Outputs {
 
     /// Path at which to write a file.
     ///
-    /// Call it before the computation: an output that exists (unless `--force`), is a folder, or whose folder is missing
-    /// is refused.
+    /// Call it before the computation: an output that exists (unless `--force`), is a folder, or whose folder is
+    /// missing is refused.
     pub fn file(&self, output: &Output) -> Result<PathBuf, Failure> {
         self.file_called(output.name())
     }
@@ -195,12 +164,24 @@ impl Outputs {
         Ok(())
     }
 
-    /// Ends the program with `code` and without outputs, unless they have their names already.
-    pub fn abandon(&self, code: i32) {
+    /// What ends the program without outputs, unless they have their names already. It does not keep the outputs, whose
+    /// temporary files are removed when the command is done with them.
+    pub fn abandoning(&self) -> impl FnOnce() + Send + 'static {
+        let outputs = Arc::downgrade(&self.0);
+        move || {
+            if let Some(state) = outputs.upgrade() {
+                Self(state).abandon();
+            }
+        }
+    }
+
+    fn abandon(&self) {
         let state = self.state();
         if state.finished {
             return;
         }
+        let stopped = Failure::stopped();
+        let _ = writeln!(io::stderr(), "error: {stopped}");
         for output in &state.staged {
             let folder = output.staging.folder();
             // Under another name, threads that still write find no place, so that it becomes empty and stays so.
@@ -212,7 +193,7 @@ impl Outputs {
             };
             let _ = fs::remove_dir_all(there);
         }
-        std::process::exit(code);
+        std::process::exit(i32::from(stopped.code()));
     }
 
     /// A message with the final names of outputs instead of the temporary ones.

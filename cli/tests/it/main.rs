@@ -6,6 +6,7 @@ mod bad_input;
 mod chain;
 mod contract;
 mod exemplars;
+mod nothing_lost;
 mod packings;
 mod reliefs;
 mod schemas;

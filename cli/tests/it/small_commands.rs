@@ -283,6 +283,7 @@ fn a_photograph_of_discs() {
     assert_eq!(
         files,
         [
+            ".stereology-files",
             "binder.png",
             "labels.tif",
             "means.png",

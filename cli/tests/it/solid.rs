@@ -60,6 +60,7 @@ fn a_small_photograph_becomes_a_solid() {
     assert_eq!(
         names,
         [
+            ".stereology-files",
             "binder.png",
             "comparison.png",
             "cube.png",

@@ -70,9 +70,9 @@ fn names_of_255_bytes_can_be_written() {
         assert!(resumed.exists());
         let aside = folder.path().join("aside");
         if aside.is_dir() {
-            fs::remove_dir_all(aside).unwrap()
+            fs::remove_dir_all(aside).unwrap();
         } else {
-            fs::remove_file(aside).unwrap()
+            fs::remove_file(aside).unwrap();
         }
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), Format::ALL.len());

@@ -45,7 +45,7 @@ pub fn mask(path: &Path, size: [usize; 3], notes: &mut Notes) -> Result<Array3<b
         let samples = read_volume(path).at(path)?.samples;
         return Ok(samples.map_axis(ndarray::Axis(3), |channels| channels.iter().any(|v| *v != 0.0)));
     }
-    let mesh = closed_mesh(&path.to_string_lossy())?;
+    let mesh = closed_mesh(path.as_os_str())?;
     for repair in mesh.repairs() {
         notes.warn(Warning::new("mesh-repaired", repair.to_string()));
     }

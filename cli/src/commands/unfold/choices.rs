@@ -56,7 +56,7 @@ pub struct Choices {
     #[arg(long, value_enum)]
     pub kernel: Option<Kernel>,
     /// Number of bootstrap replicates for confidence intervals [default: none; synthesize: 200]
-    #[arg(long, value_name = "B", value_parser = count)]
+    #[arg(long, value_name = "B", value_parser = replicates)]
     pub bootstrap: Option<usize>,
     /// What the bootstrap resamples [default: auto]
     #[arg(long, value_enum)]
@@ -75,6 +75,14 @@ pub enum Spacing {
     Geometric,
     /// Krumbein's half-phi classes: edges at powers of √2 of the unit; --bins has no effect
     Phi,
+}
+
+/// A spread needs two replicates.
+fn replicates(text: &str) -> Result<usize, String> {
+    match count(text) {
+        Ok(1) => Err("an interval needs at least 2 replicates, and 200 for its ends to be steady".to_owned()),
+        other => other,
+    }
 }
 
 /// What a bootstrap resamples.

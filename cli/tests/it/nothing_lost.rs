@@ -12,7 +12,7 @@ fn place() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let sizes: Vec<String> = (0..80).map(|i| format!("{}\n", 0.2 + f64::from(i) / 100.0)).collect();
     fs::write(folder.path().join("t.csv"), format!("size\n{}", sizes.concat())).unwrap();
-    write_discs(&path(&folder, "photo.png"));
+    write_discs(path(&folder, "photo.png"));
     folder
 }
 

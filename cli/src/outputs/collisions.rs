@@ -115,14 +115,9 @@ impl Inputs {
 }
 
 impl Place {
-    /// `None` if the path does not lead anywhere, not even to a place where a file can be made.
+    /// `None` if links lead in a circle.
     fn of(path: &Path) -> Option<Self> {
-        let path = destination(path).ok()?;
-        let whole = fs::canonicalize(&path).ok().or_else(|| {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
-            Some(folder.join(path.file_name()?))
-        })?;
+        let whole = without_links(&destination(path).ok()?);
         let found = fs::metadata(&whole).ok();
         Some(Self {
             identity: found.as_ref().filter(|of| of.is_file()).and_then(identity),
@@ -138,6 +133,16 @@ impl Place {
             return false;
         };
         self.is_folder && path.exists() && list::read(&self.path).is_none_or(|ours| list::holds(&ours, inside))
+    }
+}
+
+/// The absolute path without links and `..`, as far as it exists.
+fn without_links(path: &Path) -> PathBuf {
+    match (fs::canonicalize(path), path.parent(), path.file_name()) {
+        (Ok(whole), ..) => whole,
+        (Err(_), Some(folder), Some(name)) if folder.as_os_str().is_empty() => without_links(Path::new(".")).join(name),
+        (Err(_), Some(folder), Some(name)) => without_links(folder).join(name),
+        _ => path.to_owned(),
     }
 }
 

@@ -85,7 +85,7 @@ pub const TASKS: [Task; 15] = [
     ),
     task(
         "displace and its tables",
-        "displace ../../inputs/rock.ply --contact ../../inputs/contact.json --edge-length 0.05 -o m.glb --labels-out l.csv \
+        "displace ../../inputs/rock.ply --contact ../../inputs/contact.json --units 20 --edge-length 0.05 -o m.glb --labels-out l.csv \
          --design-out d.json",
         "--seed 1",
     ),

@@ -107,3 +107,20 @@ fn without_particles_all_is_binder() {
     assert_eq!(solid.id_at(&Point3::new(0.5, 0.5, 0.5)), None);
     assert_eq!(solid.distance_at(&Point3::origin()), f64::INFINITY);
 }
+
+/// The search ends although the nearest particle is many short sides away.
+#[test]
+fn distances_in_a_box_of_any_proportions() {
+    let long = f64::from(1 << 30);
+    for axis in 0..3 {
+        let mut sides = [1.0; 3];
+        sides[axis] = 2.0 * long;
+        let centre = Point3::from([0.5; 3]);
+        let solid = solid_of(&[Body::sphere(1.0).unwrap()], &[(centre, 0.5)], sides);
+        let mut p = centre;
+        p[axis] += long;
+        assert!((solid.distance_at(&p) - (long - 0.25)).abs() < 1e-6);
+        p[axis] = 2.0 * long - 0.5;
+        assert!((solid.distance_at(&p) - 0.75).abs() < 1e-6);
+    }
+}

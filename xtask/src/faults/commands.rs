@@ -48,8 +48,8 @@ pub const TASKS: [Task; 15] = [
         "--min-area 30",
     ),
     task(
-        "synthesize",
-        "synthesize -o out --count 120 --texture-voxels 32 --voxels 32 --bins 5 --iterations 1 --bootstrap 20",
+        "explore",
+        "explore ../../inputs/rock.ply --count 12 --pixels 64 -o out",
         "--seed 1",
     ),
     task(

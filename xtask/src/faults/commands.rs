@@ -59,7 +59,7 @@ pub const TASKS: [Task; 15] = [
     ),
     task(
         "pack and its set",
-        "pack --constant --count 3000 --fraction 0.5 -o p.json --also p.csv --also p.xyz --also p.vtp --surfaces s.vtp \
+        "pack --constant --count 300 --fraction 0.4 -o p.json --also p.csv --also p.xyz --also p.vtp --surfaces s.vtp \
          --picture p.png --trace t.csv",
         "--seed 1",
     ),

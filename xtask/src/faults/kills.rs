@@ -36,9 +36,9 @@ pub fn run(program: &Program, place: &Path, rounds: usize) -> Result<Vec<Row>> {
         let (old, _) = outputs(program, &format!("{} {}", task.line, task.other), &works.join("old"))?;
         ensure!(!new.same(&old), "{}: its two runs give the same outputs", task.name);
         for round in 0..rounds {
-            for (row, &(name, number, cleans)) in rows.iter_mut().zip(&SIGNALS) {
+            for (row, &(name, signal_number, cleans)) in rows.iter_mut().zip(&SIGNALS) {
                 let folder = works.join(format!("{name}-{round}"));
-                let over = round % 2 == 1;
+                let over = (round + number) % 2 == 1;
                 let before = if over {
                     outputs(program, &format!("{} {}", task.line, task.other), &folder)?.0
                 } else {
@@ -74,7 +74,7 @@ pub fn run(program: &Program, place: &Path, rounds: usize) -> Result<Vec<Row>> {
                 if cleans && took > PROMPT && code != Some(0) {
                     find(format!("ended {:.1} s after the signal", took.as_secs_f64()));
                 }
-                if cleans && ![Some(0), Some(128 + number)].contains(&code) {
+                if cleans && ![Some(0), Some(128 + signal_number)].contains(&code) {
                     find(format!("exit code {code:?}"));
                 }
                 // What a killed run has left is not in the way of the next one.

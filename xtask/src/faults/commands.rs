@@ -59,8 +59,7 @@ pub const TASKS: [Task; 15] = [
     ),
     task(
         "pack and its set",
-        "pack --constant --count 300 --fraction 0.4 -o p.json --also p.csv --also p.xyz --also p.vtp --surfaces s.vtp \
-         --picture p.png --trace t.csv",
+        "pack --constant --count 300 --fraction 0.4 -o p.json --also p.csv --also p.xyz --also p.vtp --surfaces s.vtp --trace t.csv",
         "--seed 1",
     ),
     task(
@@ -92,7 +91,7 @@ pub const TASKS: [Task; 15] = [
     task(
         "carve",
         "carve ../../inputs/solid ../../inputs/rock.ply --triangles 60000 -o c.glb",
-        "--triangles 3000",
+        "--turned",
     ),
     task(
         "turntable",

@@ -112,6 +112,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Check --area and its unit, and whether the sizes are diameters or areas.",
     ),
     (
+        "invalid-rows",
+        "Rows of a table with invalid values were left out, as requested.",
+        "Look at the first of them: missing values of a few particles bias the sizes if they are not missing at random.",
+    ),
+    (
         "largest-uncorrected",
         "The largest profiles all have the same size, so the largest particle size could not be extrapolated; the size of the largest profile was used.",
         "Give --max-size as a length, or omit it.",
@@ -247,6 +252,21 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Give each component its own label if they are different particles.",
     ),
     (
+        "table-format",
+        "A table is not plain (comma-separated UTF-8 with decimal points): the message states encoding, separator and decimal mark that were found.",
+        "Check them. If the decimal mark is undecided, write the numbers without marks between thousands, or with another number of decimals.",
+    ),
+    (
+        "table-layout",
+        "Something in the layout of a table was interpreted: a column by another name, lines above the header, a header in a comment, rows of statistics, names of rows, a missing header, the order of bins.",
+        "Check the message; a plain table with the columns `size` or `area` raises no warning.",
+    ),
+    (
+        "table-unit",
+        "The header of a table states the unit of a column, in which lengths are, or from which they were converted to --unit.",
+        "Check that --area and other lengths are in the unit of the message.",
+    ),
+    (
         "threshold-moved",
         "The detection limit lies inside a profile bin; the whole bin was left out.",
         "Nothing, or give --edges with an edge at --min-size.",
@@ -270,6 +290,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "vague-binder",
         "Binder and particle colours overlap: outlines are approximate, and particles with colours of the binder are missed.",
         "Look at overlay.png; give the colour of the binder with --binder, or correct the labels by hand (--labels-out, --labels).",
+    ),
+    (
+        "words-as-numbers",
+        "Categories or types of a table are words or numbers with gaps, and were numbered; or its types are kinds of selections (ImageJ) and were ignored.",
+        "Check the numbers in the message: types are the indices of --shape in the order of the command line.",
     ),
 ];
 

@@ -1,4 +1,4 @@
-//! Random changes of small mesh files and of raw meshes, for a number of seconds: `mutate [SECONDS] [SEED]`. A case
+//! Random changes of small mesh files, raw meshes and tables, for a number of seconds: `mutate [SECONDS] [SEED]`. A case
 //! that fails is written to `mutate-failure.bin`, and its target is printed.
 
 use std::panic::catch_unwind;
@@ -24,6 +24,7 @@ fn main() {
         let target = from.0;
         let outcome = catch_unwind(|| match target {
             "mesh_file" => stereology_fuzz::mesh_file(&bytes),
+            "table" => stereology_fuzz::table(&bytes),
             _ => stereology_fuzz::sweep(&bytes),
         });
         slowest = slowest.max(begin.elapsed());
@@ -40,7 +41,16 @@ fn main() {
     println!("{cases} cases in {seconds} s without a panic; the slowest took {slowest:?}");
 }
 
-/// Small meshes in every format.
+/// Small tables in several dialects.
+const TABLES: [&[u8]; 5] = [
+    b" ,Label,Area,Mean\n1,\"a, b\",403.727,1\n2,\"c \"\"d\"\"\",482.6,2\n,,,\nMean,x,1,2\nSD,x,1,2\n",
+    b"sep=;\r\nid;Area [\xb5m\xb2];y\r\n1;1.403,727;5,5\r\n2;12,5;NaN\r\n",
+    b"2\nFeature_ID,area\n1,22.67\n2,24.79\nFeature_ID,Neighbours\n1,2\n",
+    b"\"area\" \"y\"\n\"1\" 403.7 2\n\"2\" 1e5 -3\n",
+    b"# area=3\nLabel\tarea\tx\n#\t[um^2]\t[-]\na\t1\t2\nb\t-3\t1e400\n",
+];
+
+/// Small meshes in every format, and tables.
 fn corpus() -> Vec<(&'static str, Vec<u8>)> {
     let folder = std::env::temp_dir().join(format!("stereology-mutate-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for the corpus");
@@ -62,6 +72,7 @@ fn corpus() -> Vec<(&'static str, Vec<u8>)> {
             corpus.push(("sweep", raw(mesh, kind)));
         }
     }
+    corpus.extend(TABLES.map(|table| ("table", table.to_vec())));
     corpus.push(("mesh_file", ControlSphere::sphere(1.0).to_json().into_bytes()));
     let _ = std::fs::remove_dir_all(&folder);
     corpus

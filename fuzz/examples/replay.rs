@@ -6,6 +6,7 @@ fn main() {
         let start = std::time::Instant::now();
         stereology_fuzz::mesh_file(&bytes);
         stereology_fuzz::sweep(&bytes);
+        stereology_fuzz::table(&bytes);
         println!("{name}: {:?}", start.elapsed());
     }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use stereology_kmatrix::{SectionLaw, SectionOptions};
-use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TriangleMesh, convex_hull, parse_points};
+use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TableSource, TriangleMesh, convex_hull, parse_points};
 
 /// Meshes of more triangles are read and checked, but not swept, to spend the time on small ones.
 const MOST_SWEPT: usize = 400;
@@ -30,6 +30,23 @@ pub fn mesh_file(bytes: &[u8]) {
         && let Ok(sphere) = ControlSphere::from_json(text)
     {
         solid(sphere.triangles(3));
+    }
+}
+
+/// Reads the bytes as delimited text, and all of its numbers, which are finite.
+pub fn table(bytes: &[u8]) {
+    let source = TableSource {
+        columns: &["area", "size", "x"],
+        slashes: false,
+    };
+    let Ok(table) = source.parse(bytes) else { return };
+    let columns = table.columns().len().clamp(1, 64);
+    let _ = (table.format(), table.remarks(), table.column(source.columns));
+    for row in table.rows() {
+        let _ = row.check_width();
+        for number in (0..columns).filter_map(|column| row.number(column).ok()) {
+            assert!(number.is_finite());
+        }
     }
 }
 

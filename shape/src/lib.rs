@@ -64,6 +64,10 @@ pub use file::mesh_file_error::{MeshFileError, MeshFileFault, MeshFilePlace};
 #[cfg(feature = "io")]
 pub use file::point_file::{parse_points, read_points};
 #[cfg(feature = "io")]
+pub use file::table::{
+    Column, ColumnUnit, DecimalMark, Separator, Table, TableError, TableRow, TableSource, TextEncoding,
+};
+#[cfg(feature = "io")]
 pub use file::textured_mesh_file::write_textured_mesh;
 pub use generate::control_sphere::{ControlSphere, ControlSphereError};
 pub use mesh::closed_mesh::ClosedMesh;

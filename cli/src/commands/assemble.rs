@@ -87,9 +87,16 @@ impl Assemble {
         let folder = everywhere.outputs.folder(&self.output)?;
         let opened = solid::read_packing(&self.packing).at(&self.packing)?;
         let bare = opened.solid;
+        let mut notes = Notes::default();
         let colours = match &self.colours {
             None => bare.colours().to_vec(),
-            Some(path) => particle_colours(bare.particles(), &colour_table::read(path).or_fail()?, everywhere.seed),
+            Some(path) => {
+                let table = colour_table::read(path).or_fail()?;
+                table.findings.into_iter().for_each(|finding| {
+                    notes.warn(finding);
+                });
+                particle_colours(bare.particles(), &table.rows, everywhere.seed)
+            }
         };
         let sides = bare.period().sides();
         let texture = self
@@ -109,7 +116,6 @@ impl Assemble {
             .iter()
             .map(|particle| bodies[particle.shape].volume() * particle.size.powi(3))
             .sum();
-        let mut notes = Notes::default();
         notes.line(format!(
             "{} particles in a box of {}{} written to {}",
             counted(made.particles().len() as u64),

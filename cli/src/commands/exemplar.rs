@@ -247,7 +247,7 @@ impl Exemplar {
         }
         if let Some(path) = &self.fixed {
             let scale = if pictures.phases { 1.0 } else { 255.0 };
-            let fixed = given::voxels(path, pictures.exemplars[0].colours(), scale)?;
+            let fixed = given::voxels(path, pictures.exemplars[0].colours(), scale, &mut notes)?;
             domain = domain.with_fixed(fixed).at(path)?;
         }
         let step = Step::begin("exemplar", everywhere.quiet);

@@ -11,8 +11,10 @@ use stereology::anneal::{
     self, Grain, PackError, PackOptions, Packing, SizeDensities, SizeInBin, box_for_fraction, count_to_fill,
     grains_from_densities, lognormal_sizes, mix, pack, populate, scale_to_fraction, total_volume,
 };
+use stereology::files::ReadTable;
+use stereology::files::densities::{self, DensityHistogram};
 use stereology::files::packing::PackingFile;
-use stereology::files::{densities, profiles, table_head};
+use stereology::files::profiles::{self, Headless, ProfileReading, ProfileRow};
 use stereology::grid::LengthUnit;
 use stereology::shape::{Arrangement, PeriodicBox, UnitBody};
 
@@ -68,6 +70,10 @@ pub struct Pack {
     /// Maximum number of iterations; with --mode sequential, of positions tried for one particle
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count)]
     pub iterations: usize,
+    /// Leave out rows of --sizes with invalid values (NaN, empty, not above zero), which are counted in a warning,
+    /// instead of refusing the table
+    #[arg(long)]
+    pub skip_invalid: bool,
     /// Also compute statistics of the packing: radial distribution, order, orientations, sections
     #[arg(long)]
     pub quality: bool,
@@ -102,9 +108,19 @@ pub struct Sizes {
     /// All sizes are 1
     #[arg(long)]
     pub constant: bool,
-    /// Table with a column `size` and one row per particle (CSV)
+    /// Table with a column `size` and one row per particle (CSV), or a single column without a header
     #[arg(long, value_name = "CSV")]
     pub sizes: Option<PathBuf>,
+}
+
+/// The table of the sizes, with its file.
+enum SizeTable<'a> {
+    /// None is given.
+    None,
+    /// Number densities.
+    Densities(&'a Path, ReadTable<DensityHistogram>),
+    /// A row per particle.
+    Sizes(&'a Path, ReadTable<ProfileRow>),
 }
 
 /// Packing algorithm.
@@ -278,13 +294,19 @@ impl Pack {
         }
         let files = self.files(&everywhere.outputs)?;
         let started = Instant::now();
-        let unit = self.unit(everywhere)?;
+        let mut table = self.table(everywhere)?;
+        let unit = unit(&table, everywhere)?;
+        let findings = match &mut table {
+            SizeTable::None => Vec::new(),
+            SizeTable::Densities(_, of) => std::mem::take(&mut of.findings),
+            SizeTable::Sizes(_, of) => std::mem::take(&mut of.findings),
+        };
         let Shapes { names, shares, bodies } = self.shapes()?;
         let Population {
             grains,
             period,
             expected,
-        } = self.grains(&bodies, &shares, everywhere)?;
+        } = self.grains(table, &bodies, &shares, everywhere)?;
         let requested = total_volume(&bodies, &grains).or_fail()? / period.volume();
         let step = Step::begin("packing", everywhere.quiet);
         let progress = |done: f64| step.at(done);
@@ -300,6 +322,9 @@ impl Pack {
 
         let sides: [f64; 3] = packing.sides().into();
         let mut notes = notes(&packing, started.elapsed(), expected);
+        findings.into_iter().for_each(|finding| {
+            notes.warn(finding);
+        });
         let fields = PackFields {
             particles: packing.particles().len(),
             sides,
@@ -337,22 +362,23 @@ impl Pack {
         })
     }
 
-    /// The unit of the table of sizes or densities, or of the options.
-    fn unit(&self, everywhere: &Everywhere) -> Result<Option<LengthUnit>, Failure> {
-        let Some(table) = self.sizes.densities.as_ref().or(self.sizes.sizes.as_ref()) else {
-            return Ok(everywhere.unit);
-        };
-        match (table_head::read(table).or_fail()?.unit.unit(), everywhere.unit) {
-            (Some(stated), Some(given)) if stated != given => Err(Failure::run(format!(
-                "--unit {given} contradicts unit={stated} in the head of {}; leave the option out, or correct the table",
-                table.display()
-            ))),
-            (Some(stated), _) if everywhere.scale_given.is_some() => Err(Failure::run(format!(
-                "--scale contradicts {}: its lengths are in {stated} already (unit={stated})",
-                table.display()
-            ))),
-            (stated, given) => Ok(stated.or(given)),
+    /// Reads the table of sizes or densities.
+    fn table(&self, everywhere: &Everywhere) -> Result<SizeTable<'_>, Failure> {
+        if self.skip_invalid && self.sizes.sizes.is_none() {
+            return Err(Failure::usage("--skip-invalid is for the rows of --sizes"));
         }
+        if let Some(path) = &self.sizes.densities {
+            return Ok(SizeTable::Densities(path, densities::read(path).or_fail()?));
+        }
+        let Some(path) = &self.sizes.sizes else {
+            return Ok(SizeTable::None);
+        };
+        let reading = ProfileReading {
+            unit: everywhere.unit.filter(|_| everywhere.scale_given.is_none()),
+            skip_invalid: self.skip_invalid,
+            headless: Headless::Sizes,
+        };
+        Ok(SizeTable::Sizes(path, profiles::read(path, &reading).or_fail()?))
     }
 
     fn shapes(&self) -> Result<Shapes, Failure> {
@@ -376,22 +402,27 @@ impl Pack {
     }
 
     /// The particles' sizes, shapes and categories, and their box.
-    fn grains(&self, bodies: &[UnitBody], shares: &[f64], everywhere: &Everywhere) -> Result<Population, Failure> {
+    fn grains(
+        &self,
+        table: SizeTable<'_>,
+        bodies: &[UnitBody],
+        shares: &[f64],
+        everywhere: &Everywhere,
+    ) -> Result<Population, Failure> {
         let seed = everywhere.seed;
         let scale = everywhere.scale;
-        if let Some(table) = &self.sizes.densities {
-            return self.grains_of_table(table, bodies, shares, everywhere);
+        if let SizeTable::Densities(path, histograms) = table {
+            return self.grains_of_table(path, histograms.rows, bodies, shares, everywhere);
         }
         let fraction = self.fraction.unwrap_or(0.5);
         let cube = |side: BoxSides| PeriodicBox::new(Vector3::from(side.0) * scale).or_usage("--box");
-        if let Some(table) = &self.sizes.sizes {
+        if let SizeTable::Sizes(table, ReadTable { rows, .. }) = table {
             if self.count.is_some() {
                 return Err(Failure::usage(
                     "--count cannot be combined with --sizes: every row of the table is a particle",
                 ));
             }
             let mut grains = Vec::new();
-            let rows = profiles::read(table).or_fail()?.rows;
             let drawn = mix(
                 &rows.iter().map(|row| row.size * scale).collect::<Vec<_>>(),
                 shares,
@@ -444,12 +475,13 @@ impl Pack {
     fn grains_of_table(
         &self,
         table: &Path,
+        densities: Vec<DensityHistogram>,
         bodies: &[UnitBody],
         shares: &[f64],
         everywhere: &Everywhere,
     ) -> Result<Population, Failure> {
         let mut histograms = Vec::new();
-        for histogram in densities::read(table).or_fail()? {
+        for histogram in densities {
             match histogram.shape {
                 Some(shape) if shape >= bodies.len() => return Err(no_such_shape(table, shape, bodies.len())),
                 Some(shape) => histograms.push((shape, histogram)),
@@ -502,6 +534,26 @@ impl Pack {
             period,
             expected: Some(total * volume),
         })
+    }
+}
+
+/// The unit of the table of sizes or densities, or of the options.
+fn unit(table: &SizeTable<'_>, everywhere: &Everywhere) -> Result<Option<LengthUnit>, Failure> {
+    let (path, head) = match table {
+        SizeTable::None => return Ok(everywhere.unit),
+        SizeTable::Densities(path, of) => (path, &of.head),
+        SizeTable::Sizes(path, of) => (path, &of.head),
+    };
+    match (head.unit.unit(), everywhere.unit) {
+        (Some(stated), Some(given)) if stated != given => Err(Failure::run(format!(
+            "--unit {given} contradicts {}, whose lengths are in {stated} (unit={stated}); leave the option out, or correct the table",
+            path.display()
+        ))),
+        (Some(stated), _) if everywhere.scale_given.is_some() => Err(Failure::run(format!(
+            "--scale contradicts {}: its lengths are in {stated} already (unit={stated})",
+            path.display()
+        ))),
+        (stated, given) => Ok(stated.or(given)),
     }
 }
 

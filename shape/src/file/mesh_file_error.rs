@@ -121,6 +121,12 @@ pub enum MeshFileFault {
         /// Its message.
         message: String,
     },
+    /// A fault of delimited text, and how it was understood.
+    #[error("{message}")]
+    Table {
+        /// What is wrong.
+        message: String,
+    },
     /// No faces.
     #[error("there are no faces")]
     NoFaces,

@@ -1,4 +1,4 @@
-//! Mesh and point files.
+//! Mesh and point files, and delimited text.
 
 pub(crate) mod coloured_mesh_file;
 pub(crate) mod glb;
@@ -9,4 +9,5 @@ pub(crate) mod ply;
 pub(crate) mod point_file;
 pub(crate) mod polygon;
 pub(crate) mod stl;
+pub(crate) mod table;
 pub(crate) mod textured_mesh_file;

@@ -5,13 +5,15 @@ use std::path::Path;
 use nalgebra::Point3;
 
 use crate::file::mesh_file::{MeshFormat, read_mesh};
-use crate::file::mesh_file_error::{Fault, MeshFileError, MeshFileFault, MeshFilePlace, coordinate};
+use crate::file::mesh_file_error::{MeshFileError, MeshFileFault, MeshFilePlace};
+use crate::file::table::{Table, TableError, TableRow, TableSource};
 
 /// Reads points: the vertices of a mesh file (.obj, .stl, .ply), or the rows of a text file of any other name.
 ///
-/// A row is three numbers x, y, z, separated by commas, semicolons, tabs or blanks; further columns (colours, normals)
-/// are ignored. A first row of words is a header; if it names columns x, y and z, those are used. Empty rows, rows that
-/// begin with `#` or `//`, and the number of points at the start of many .xyz and .pts files are skipped.
+/// A text file is delimited text ([`Table`]): a header names the columns x, y and z, also with units of length, as
+/// `Points:0` (ParaView) or `centroid-2` (scikit-image); other columns are ignored. Without a header the first three
+/// columns are x, y, z, unless the first numbers the rows. Lines that begin with `#` or `//` are comments, or the header
+/// (CloudCompare); the number of points may precede the rows.
 ///
 /// # Errors
 ///
@@ -53,74 +55,109 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point3<f64>>, MeshFileE
 /// # Ok::<(), stereology_shape::MeshFileError>(())
 /// ```
 pub fn parse_points(bytes: &[u8], name: &Path) -> Result<Vec<Point3<f64>>, MeshFileError> {
-    rows(bytes).map_err(|(place, fault)| MeshFileError::Content {
+    points(bytes).map_err(|error| MeshFileError::Content {
         path: name.to_owned(),
-        place,
-        fault,
+        place: error.line.map_or(MeshFilePlace::File, MeshFilePlace::Line),
+        fault: MeshFileFault::Table {
+            message: TableError { line: None, ..error }.to_string(),
+        },
     })
 }
 
-fn rows(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Fault> {
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let lines = bytes[..error.valid_up_to()]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count();
-        let expected = MeshFileFault::Expected {
-            expected: "text: rows of x, y, z (or a mesh file, .obj, .stl or .ply)",
-            found: "bytes that are not text".to_owned(),
-        };
-        (MeshFilePlace::Line(lines + 1), expected)
-    })?;
-    let mut columns = None;
-    let mut points = Vec::new();
-    // The byte order mark that some editors write.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') || line.starts_with("//") {
-            continue;
-        }
-        let words: Vec<&str> = words(line);
-        let Some(columns) = columns else {
-            let is_count = words.len() == 1 && words[0].parse::<u64>().is_ok();
-            if is_count {
-                columns = Some([0, 1, 2]);
-                continue;
-            }
-            columns = Some(header(&words).unwrap_or([0, 1, 2]));
-            // A row with a number is not a header, so no point is skipped silently.
-            if words.iter().any(|word| word.parse::<f64>().is_ok()) {
-                points.push(point(&words, [0, 1, 2], number)?);
-            }
-            continue;
-        };
-        points.push(point(&words, columns, number)?);
-    }
-    Ok(points)
-}
+/// Names of columns of x, y and z.
+const NAMES: [[&str; 11]; 3] = [
+    [
+        "x",
+        "xcoordinate",
+        "coordinatex",
+        "xcoord",
+        "coordx",
+        "posx",
+        "positionx",
+        "centroidx",
+        "centerx",
+        "points0",
+        "centroid2",
+    ],
+    [
+        "y",
+        "ycoordinate",
+        "coordinatey",
+        "ycoord",
+        "coordy",
+        "posy",
+        "positiony",
+        "centroidy",
+        "centery",
+        "points1",
+        "centroid1",
+    ],
+    [
+        "z",
+        "zcoordinate",
+        "coordinatez",
+        "zcoord",
+        "coordz",
+        "posz",
+        "positionz",
+        "centroidz",
+        "centerz",
+        "points2",
+        "centroid0",
+    ],
+];
 
-fn words(line: &str) -> Vec<&str> {
-    match line.find([',', ';']).map(|at| line.as_bytes()[at]) {
-        Some(separator) => line.split(char::from(separator)).map(str::trim).collect(),
-        None => line.split_whitespace().collect(),
-    }
-}
-
-/// Where a header has the columns x, y and z.
-fn header(words: &[&str]) -> Option<[usize; 3]> {
-    let place = |name: &str| {
-        words
-            .iter()
-            .position(|word| word.trim_matches('"').eq_ignore_ascii_case(name))
+fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, TableError> {
+    let source = TableSource {
+        columns: NAMES.as_flattened(),
+        slashes: true,
     };
-    Some([place("x")?, place("y")?, place("z")?])
+    let table = source.parse(bytes)?;
+    let columns = columns(&table)?;
+    let mut rows = table.rows().peekable();
+    // The number of points, in many .xyz and .pts files.
+    let is_count = |row: &TableRow<'_>| row.fields().count() == 1 && row.text(0).parse::<u64>().is_ok();
+    if table.columns().is_empty() {
+        rows.next_if(is_count);
+    }
+    let point = |row: TableRow<'_>| {
+        let [x, y, z] = columns.map(|column| row.number(column));
+        Ok(Point3::new(x?, y?, z?))
+    };
+    rows.map(point).collect()
 }
 
-fn point(words: &[&str], columns: [usize; 3], line: usize) -> Result<Point3<f64>, Fault> {
-    let at =
-        |column: usize| coordinate(words.get(column).copied()).map_err(|fault| (MeshFilePlace::Line(line + 1), fault));
-    Ok(Point3::new(at(columns[0])?, at(columns[1])?, at(columns[2])?))
+/// The columns of x, y and z.
+fn columns(table: &Table) -> Result<[usize; 3], TableError> {
+    if table.columns().is_empty() {
+        return if numbers_its_rows(table) {
+            let what = "the first of four or more columns numbers the rows: name x, y and z in a header";
+            Err(table.error(None, what))
+        } else {
+            Ok([0, 1, 2])
+        };
+    }
+    let [x, y, z] = NAMES.map(|names| table.column(&names));
+    let (Some(x), Some(y), Some(z)) = (x?, y?, z?) else {
+        return Err(table.error(None, "the header does not name columns x, y and z"));
+    };
+    let units = [x, y, z].map(|column| table.columns()[column].unit.as_ref());
+    let differ = units.iter().any(|unit| *unit != units[0]);
+    if differ || units[0].is_some_and(|unit| unit.power != 1) {
+        return Err(table.error(None, "x, y and z do not have one unit of length"));
+    }
+    Ok([x, y, z])
+}
+
+/// Whether the first of four or more columns counts the rows, from 0 or 1.
+fn numbers_its_rows(table: &Table) -> bool {
+    let mut first = None;
+    let counts = table.rows().enumerate().all(|(index, row)| {
+        let number: Option<usize> = row.text(0).parse().ok();
+        let start = number.and_then(|number| number.checked_sub(index));
+        row.fields().count() > 3 && start.is_some_and(|start| start < 2 && *first.get_or_insert(start) == start)
+    });
+    counts && table.rows().count() > 3
 }
 
 #[cfg(test)]
@@ -147,18 +184,53 @@ mod tests {
     }
 
     #[test]
+    fn headers_are_understood_or_refused() {
+        let point = Some(Point3::new(1.0, 2.0, 3.0));
+        for text in [
+            "Point,X [mm],Y [mm],Z [mm]\n7,1,2,3\n",
+            "X;Y;Z\n1,0;2,0;3,0\n",
+            "label,centroid-0,centroid-1,centroid-2\n1,3,2,1\n",
+            "\"Points:2\",\"Points:1\",\"Points:0\"\n3,2,1\n",
+            "//X Y Z R G B\n1 2 3 255 0 0\n",
+            "# z y x\n3 2 1\n",
+            "# three corner points\n1 2 3\n",
+            "1\nz,y,x\n3,2,1\n",
+            "1\n1 2 3\n",
+            "\"x\" \"y\" \"z\"\n\"a\" 1 2 3\n",
+        ] {
+            assert_eq!(parse(text).unwrap().first().copied(), point, "{text}");
+        }
+        let understood = "(read as: encoding UTF-8, separator comma, decimal mark point, columns a | b | c)";
+        for (text, what) in [
+            ("a,b,c\n1,2,3\n", "does not name columns x, y and z"),
+            ("a,b,c\n1,2,3\n", understood),
+            ("x,y,z,x\n1,2,3,4\n", "could all be meant by `x`"),
+            ("x [mm],y [um],z [mm]\n1,2,3\n", "one unit of length"),
+            ("0,1,2,3\n1,1,2,4\n2,1,3,3\n3,2,2,3\n", "numbers the rows"),
+            (
+                "x;y;z\n1;2,5;4\n1;5.5;6\n",
+                "may have a decimal point or a decimal comma",
+            ),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(what), "{text}: {error}");
+        }
+    }
+
+    #[test]
     fn faults_name_their_line() {
-        assert_eq!(
-            parse("x,y,z\n1,2,3\n4,5\n").unwrap_err(),
-            "p.csv: line 3: \"\" is not a finite coordinate"
-        );
-        assert!(parse("1,2,3\n4,nan,6\n").unwrap_err().contains("line 2: \"nan\""));
-        assert!(parse("1,2,3\n1,2,three\n").unwrap_err().contains("line 2: \"three\""));
+        let error = parse("x,y,z\n1,2,3\n4,5\n").unwrap_err();
+        assert!(error.starts_with("p.csv: line 3: column `z` is empty"), "{error}");
+        assert!(parse("1,2,3\n4,nan,6\n").unwrap_err().contains("line 2: `nan`"));
+        assert!(parse("1,2,3\n1,2,three\n").unwrap_err().contains("line 2: `three`"));
         let error = parse_points(b"1,2,3\n\xff\xfe", "p.xyz".as_ref())
             .unwrap_err()
             .to_string();
-        assert!(error.contains("line 2: expected text"), "{error}");
-        assert!(parse("Na 1 2 3\n").unwrap_err().contains("line 1: \"Na\""));
+        assert!(
+            error.contains("line 2: `\u{ff}\u{fe}` in field 1 is not a number"),
+            "{error}"
+        );
+        assert!(parse("Na 1 2 3\n").unwrap_err().contains("line 1: `Na`"));
         assert_eq!(parse("").unwrap(), []);
     }
 }

@@ -16,3 +16,5 @@ mod queries;
 mod random_shapes;
 mod sections;
 mod spheres;
+#[cfg(feature = "io")]
+mod tables;

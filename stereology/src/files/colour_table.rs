@@ -2,8 +2,11 @@
 //! `profiles.csv` is such a table; so is a palette with one row per category.
 
 use crate::files::FileError;
+use crate::files::delimited::{Opened, ReadTable, needed};
+use crate::files::labels;
 use crate::pipeline::ColourSample;
 use std::path::Path;
+use stereology_shape::{Table, TableError};
 
 /// Reads the table, for [`particle_colours`](crate::pipeline::particle_colours).
 ///
@@ -19,52 +22,41 @@ use std::path::Path;
 /// let folder = tempfile::tempdir()?;
 /// let file = folder.path().join("palette.csv");
 /// std::fs::write(&file, "category,r,g,b\n0,255,0,0\n1,0,51,255\n")?;
-/// let palette = colour_table::read(&file)?;
+/// let palette = colour_table::read(&file)?.rows;
 /// assert_eq!((palette[1].category, palette[1].colour), (1, [0.0, 0.2, 1.0]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<ColourSample>, FileError> {
+pub fn read(path: impl AsRef<Path>) -> Result<ReadTable<ColourSample>, FileError> {
     let path = path.as_ref();
-    parse(path).map_err(|what| FileError::value(path, what))
+    Opened::read(path, &["r", "g", "b", "category"])?.into_rows(path, |table, _, _| samples(table))
 }
 
-fn parse(path: &Path) -> Result<Vec<ColourSample>, String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| format!("cannot be read ({error})"))?;
-    let headers = reader.headers().map_err(|error| error.to_string())?.clone();
-    let column = |name: &str| headers.iter().position(|header| header.eq_ignore_ascii_case(name));
-    let needed = |name: &str| {
-        column(name)
-            .ok_or_else(|| format!("has no column `{name}`; a table of colours has r,g,b, and may have category,size"))
-    };
+fn samples(table: &Table) -> Result<Vec<ColourSample>, TableError> {
+    let needed = |name: &str| needed(table, name, "a table of colours has r,g,b, and may have category,size");
     let channels = [needed("r")?, needed("g")?, needed("b")?];
-    let (category, size) = (column("category"), column("size"));
+    let (category, size) = (table.column(&["category"])?, table.column(&["size"])?);
     let mut samples: Vec<ColourSample> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| error.to_string())?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let field = |column: usize| record.get(column).unwrap_or_default();
-        let number = |column: usize, most: f64| match field(column).parse::<f64>() {
-            Ok(value) if (0.0..=most).contains(&value) => Ok(value),
-            _ => Err(format!(
-                "line {line}: `{}` in column `{}` is not valid",
-                field(column),
-                &headers[column]
-            )),
+    let mut seen = [false; 256];
+    for row in table.rows() {
+        row.check_width()?;
+        let number = |column: usize, most: f64| match row.number(column)? {
+            value if (0.0..=most).contains(&value) => Ok(value),
+            value => {
+                let name = &table.columns()[column].name;
+                Err(row.error(format!("`{value}` in column `{name}` is not valid")))
+            }
         };
         let of: u8 = match category {
             None => 0,
-            Some(column) => field(column)
-                .parse()
-                .map_err(|_| format!("line {line}: `{}` is not a category from 0 to 255", field(column)))?,
+            Some(column) => {
+                let index = labels::indices(&[row.text(column)]).map(|indices| indices[0]);
+                index.ok_or_else(|| row.error(format!("`{}` is not a category from 0 to 255", row.text(column))))?
+            }
         };
-        if size.is_none() && samples.iter().any(|sample| sample.category == of) {
-            return Err(format!(
-                "line {line}: category {of} has several colours, of which one is chosen by size, but there is no column `size`"
-            ));
+        if size.is_none() && std::mem::replace(&mut seen[usize::from(of)], true) {
+            return Err(row.error(format!(
+                "category {of} has several colours, of which one is chosen by size, but there is no column `size`"
+            )));
         }
         let [r, g, b] = channels.map(|channel| number(channel, 255.0));
         samples.push(ColourSample {
@@ -74,7 +66,7 @@ fn parse(path: &Path) -> Result<Vec<ColourSample>, String> {
         });
     }
     if samples.is_empty() {
-        return Err("has a header but no colours".to_owned());
+        return Err(table.error(None, "has a header but no colours"));
     }
     Ok(samples)
 }

@@ -3,11 +3,15 @@
 //! them.
 
 use crate::files::FileError;
+use crate::files::delimited::{Opened, ReadTable, needed};
+use crate::files::table_head::{TableHead, TableUnit};
 use crate::pipeline::ParticleDensities;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
 use stereology_grid::{LengthUnit, write_atomically};
+use stereology_metrics::Finding;
+use stereology_shape::{Table, TableError, TableRow};
 use stereology_unfold::Interval;
 
 /// Writes densities: rows of all particles, then those of each type and of each category if there are several. The
@@ -172,63 +176,53 @@ type Key = (Option<usize>, Option<u8>);
 ///
 /// [`FileError`] with the line: a missing column, a value that is not a number, bins that do not follow each other, no
 /// density above zero.
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<DensityHistogram>, FileError> {
+pub fn read(path: impl AsRef<Path>) -> Result<ReadTable<DensityHistogram>, FileError> {
     let path = path.as_ref();
-    parse(path).map_err(|what| FileError::value(path, what))
+    Opened::read(path, &["loweredge", "upperedge", "numberdensity"])?.into_rows(path, histograms)
 }
 
-fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| format!("cannot be read ({error})"))?;
-    let headers = reader.headers().map_err(|error| error.to_string())?.clone();
-    let column = |name: &str| headers.iter().position(|header| header == name);
-    let needed = |name: &str| {
-        column(name).ok_or_else(|| {
-            format!("line 1 has no column `{name}`; a table of densities has the columns lower_edge,upper_edge,number_density,...")
-        })
-    };
-    let (lower, upper, density) = (needed("lower_edge")?, needed("upper_edge")?, needed("number_density")?);
-    let (shape, category) = (column("type"), column("category"));
-    let mut histograms: BTreeMap<Key, Vec<[f64; 3]>> = BTreeMap::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| error.to_string())?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: usize| match record.get(column).unwrap_or_default().parse::<f64>() {
-            Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-            _ => Err(format!(
-                "line {line}: `{}` in column `{}` is not a finite number, zero or above",
-                record.get(column).unwrap_or_default(),
-                &headers[column]
-            )),
-        };
-        let index = |column: Option<usize>| match column.and_then(|column| record.get(column)).unwrap_or_default() {
+fn histograms(
+    table: &Table,
+    head: &mut TableHead,
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<DensityHistogram>, TableError> {
+    let has = "a table of densities has the columns lower_edge,upper_edge,number_density,...";
+    let needed = |name: &str| needed(table, name, has);
+    let columns = [needed("lower_edge")?, needed("upper_edge")?, needed("number_density")?];
+    let (shape, category) = (table.column(&["type"])?, table.column(&["category"])?);
+    unit(table, [columns[0], columns[1]], head)?;
+    let mut histograms: BTreeMap<Key, Vec<(usize, [f64; 3])>> = BTreeMap::new();
+    for row in table.rows() {
+        row.check_width()?;
+        let index = |column: Option<usize>| match column.map_or("", |column| row.text(column)) {
             "" => Ok(None),
             text => text
                 .parse::<u8>()
                 .map(Some)
-                .map_err(|_| format!("line {line}: `{text}` is not an index from 0 to 255")),
+                .map_err(|_| row.error(format!("`{text}` is not an index from 0 to 255"))),
         };
-        let (a, b) = (number(lower)?, number(upper)?);
-        if a >= b {
-            return Err(format!("line {line}: the bin from {a} to {b} is empty"));
-        }
-        let n = if record.get(density).unwrap_or_default().is_empty() {
-            0.0
-        } else {
-            number(density)?
-        };
-        let bins = histograms
+        histograms
             .entry((index(shape)?.map(usize::from), index(category)?))
-            .or_default();
-        if bins.last().is_some_and(|last| (last[1] - a).abs() > 1e-9 * b) {
-            return Err(format!(
-                "line {line}: the bin begins at {a}, which is not the end of the bin before it; bins must be contiguous"
-            ));
+            .or_default()
+            .push((row.line(), bin(&row, columns)?));
+    }
+    let mut sorted = false;
+    for bins in histograms.values_mut() {
+        // Tables of sieves go from coarse to fine.
+        sorted |= !bins.is_sorted_by(|a, b| a.1[0] <= b.1[0]);
+        bins.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+        for pair in bins.windows(2) {
+            let ([_, end, _], (line, [start, upper, _])) = (pair[0].1, pair[1]);
+            if (end - start).abs() > 1e-9 * upper {
+                return Err(table.error(
+                    Some(line),
+                    format!("the bin begins at {start}, where no other bin ends; bins must be contiguous"),
+                ));
+            }
         }
-        bins.push([a, b, n]);
+    }
+    if sorted {
+        findings.push(Finding::new("table-layout", "the bins were sorted by size"));
     }
     let with_category = histograms.keys().any(|key| key.1.is_some());
     let with_shape = histograms
@@ -243,10 +237,10 @@ fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
             edges: bins
                 .iter()
                 .take(1)
-                .map(|bin| bin[0])
-                .chain(bins.iter().map(|bin| bin[1]))
+                .map(|(_, bin)| bin[0])
+                .chain(bins.iter().map(|(_, bin)| bin[1]))
                 .collect(),
-            number_density: bins.iter().map(|bin| bin[2]).collect(),
+            number_density: bins.iter().map(|(_, bin)| bin[2]).collect(),
         })
         .collect();
     if found
@@ -254,9 +248,40 @@ fn parse(path: &Path) -> Result<Vec<DensityHistogram>, String> {
         .flat_map(|histogram| &histogram.number_density)
         .all(|&n| n <= 0.0)
     {
-        return Err("no number density is above zero; there is nothing to pack".to_owned());
+        return Err(table.error(None, "no number density is above zero; there is nothing to pack"));
     }
     Ok(found)
+}
+
+/// Edges and number density of a bin; an empty field is a density of zero.
+fn bin(row: &TableRow<'_>, [lower, upper, density]: [usize; 3]) -> Result<[f64; 3], TableError> {
+    let number = |column: usize| match row.number(column)? {
+        value if value >= 0.0 => Ok(value),
+        value => Err(row.error(format!("{value} is not a finite number, zero or above"))),
+    };
+    let (a, b) = (number(lower)?, number(upper)?);
+    if a >= b {
+        return Err(row.error(format!("the bin from {a} to {b} is empty")));
+    }
+    let n = if row.text(density).is_empty() {
+        0.0
+    } else {
+        number(density)?
+    };
+    Ok([a, b, n])
+}
+
+/// The unit of the edges in the header becomes that of the head.
+fn unit(table: &Table, edges: [usize; 2], head: &mut TableHead) -> Result<(), TableError> {
+    let [lower, upper] = edges.map(|column| table.columns()[column].unit.as_ref());
+    let Some(unit) = lower.or(upper) else { return Ok(()) };
+    let unit = unit.length.parse().map_or(TableUnit::Pixels, TableUnit::Unit);
+    if (upper.is_some() && lower.is_some() && lower != upper) || (head.unit != TableUnit::Unknown && head.unit != unit)
+    {
+        return Err(table.error(None, "the edges of the bins have two units"));
+    }
+    head.unit = unit;
+    Ok(())
 }
 
 #[cfg(test)]
@@ -267,7 +292,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("densities.csv");
         std::fs::write(&file, text).unwrap();
-        read(&file).map_err(|error| error.to_string())
+        read(&file).map(|table| table.rows).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -284,6 +309,11 @@ mod tests {
                 found[1].number_density.as_slice()
             ),
             (1, &[0.0, 1.0, 2.0][..], &[0.0, 2.0][..])
+        );
+        let ascending = table("lower_edge,upper_edge,number_density\n0,1,5\n1,2,7\n");
+        assert_eq!(
+            table("Lower edge;Upper edge;Number density\n1,0;2;7\n0;1;5\n"),
+            ascending
         );
         assert_eq!(
             table("lower_edge,upper_edge,number_density\n0,1,5\n").unwrap()[0].shape,

@@ -1,7 +1,8 @@
 //! Files of profiles, densities, packings and solids: one module per format, with its `write` and its `read`.
 //!
 //! Lengths are in the unit of the run, colours are sRGB-encoded values / 255. Files hold neither times nor paths. Every
-//! file is written completely or not at all, and numbers are read back bit for bit.
+//! file is written completely or not at all, and numbers are read back bit for bit. Tables are read by
+//! [`shape::Table`](crate::shape::Table), whatever their separator, encoding or decimal mark.
 //!
 //! | module | file | content |
 //! |---|---|---|
@@ -20,8 +21,11 @@
 //! | [`size_columns`] | | columns of a table of profiles that contradict each other |
 //! | [`voxel_table`] | CSV | values at single voxels or points |
 
+mod delimited;
 mod error;
 mod json;
+mod labels;
+mod profile_columns;
 
 pub mod colour_table;
 pub mod densities;
@@ -38,4 +42,5 @@ pub mod voxel_table;
 pub mod vtp;
 pub mod xyz;
 
+pub use delimited::ReadTable;
 pub use error::FileError;

@@ -1,14 +1,19 @@
-//! `profiles.csv`: a table of profiles with a header. `size` or `area` is required; `type`, `category`, `weight`,
+//! `profiles.csv`: a table of profiles with a header. `size` or `area`, or another name of these, is required; `type`, `category`, `weight`,
 //! `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are
 //! ignored. The table may begin with lines `# key=value` ([`table_head`]).
 
 use crate::files::FileError;
-use crate::files::table_head::{self, TableHead, TableUnit};
-use std::fs::File;
+use crate::files::delimited::{Opened, ReadTable};
+use crate::files::labels;
+pub use crate::files::profile_columns::Headless;
+use crate::files::profile_columns::{Measure, ProfileColumns, Scales};
+use crate::files::table_head::{TableHead, TableUnit};
 use std::io::Write;
 use std::path::Path;
 use stereology_grid::{LengthUnit, write_atomically};
+use stereology_metrics::Finding;
 use stereology_segment::Segmentation;
+use stereology_shape::{Table, TableError, TableRow};
 use stereology_unfold::{BoundingBox, EdgeRule};
 
 /// Columns of the table of a segmentation.
@@ -88,7 +93,7 @@ pub struct ProfileRow {
     pub category: Option<u8>,
     /// Weight in the counts; 1 if the table has no weights.
     pub weight: f64,
-    /// Index of the slice, if the table has slices.
+    /// Number of the slice among those of the table, from 0, if the table has slices.
     pub slice: Option<usize>,
     /// Whether the profile touches the edge of its slice, if the table has that column.
     pub touches_edge: Option<bool>,
@@ -100,227 +105,262 @@ pub struct ProfileRow {
     pub position: Option<[f64; 2]>,
 }
 
-/// Reads a table of profiles; areas are converted to equivalent circular diameters, √(4 A / π).
+/// A table of profiles.
+pub type ProfileTable = ReadTable<ProfileRow>;
+
+/// How a table of profiles is read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ProfileReading {
+    /// The unit to which lengths are converted if the header states theirs.
+    pub unit: Option<LengthUnit>,
+    /// Rows with an invalid value, such as NaN, are left out and counted, in place of an error.
+    pub skip_invalid: bool,
+    /// A table without a header.
+    pub headless: Headless,
+}
+
+/// Reads a table of profiles; areas are converted to equivalent circular diameters, √(4 A / π). It is delimited text of
+/// any kind ([`Table`]), with the names of columns that ImageJ, scikit-image, CellProfiler, DREAM.3D, GrainSizeTools and
+/// QuPath use.
+///
+/// Slices, categories and types may be words or any numbers. Slices are numbered from 0 without gaps; so are
+/// categories and types that are not whole numbers from 0 to 255, in alphabetical order.
 ///
 /// # Errors
 ///
-/// [`FileError`] with the line: no column of sizes or areas, an invalid value, no profiles.
-pub fn read(path: impl AsRef<Path>) -> Result<ProfileTable, FileError> {
+/// [`FileError`] with the line: no column of sizes or areas, an invalid value, no profiles. It shows how the table was
+/// understood.
+pub fn read(path: impl AsRef<Path>, reading: &ProfileReading) -> Result<ProfileTable, FileError> {
     let path = path.as_ref();
-    Ok(ProfileTable {
-        head: table_head::read(path)?,
-        rows: parse(path).map_err(|what| FileError::value(path, what))?,
+    Opened::read(path, &ProfileColumns::names())?.into_rows(path, |table, head, findings| {
+        let columns = ProfileColumns::of(table, reading.headless, findings)?;
+        let scales = Scales::of(table, &columns, reading.unit, head, findings)?;
+        let mut rows = Vec::new();
+        let mut labels = Labels::default();
+        let (mut invalid, mut first_fault) = (0_usize, None);
+        for row in table.rows() {
+            match profile(&row, &columns, &scales) {
+                Ok(profile) => {
+                    rows.push(profile);
+                    labels.push(&row, &columns);
+                }
+                Err(fault) if reading.skip_invalid => {
+                    invalid += 1;
+                    first_fault.get_or_insert(fault);
+                }
+                Err(fault) => return Err(fault),
+            }
+        }
+        if rows.is_empty() {
+            return Err(first_fault.unwrap_or_else(|| table.error(None, "has a header but no profiles")));
+        }
+        labels.number(&mut rows, table, findings)?;
+        findings.extend(first_fault.map(|fault| {
+            let fault = TableError { read_as: None, ..fault };
+            Finding::new(
+                "invalid-rows",
+                format!("{invalid} rows with invalid values were left out; the first: {fault}"),
+            )
+        }));
+        Ok(rows)
     })
 }
 
-/// A table of profiles.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ProfileTable {
-    /// What its first lines state.
-    pub head: TableHead,
-    /// The profiles.
-    pub rows: Vec<ProfileRow>,
+/// Words of the columns of labels.
+#[derive(Default)]
+struct Labels<'a> {
+    kinds: Vec<&'a str>,
+    categories: Vec<&'a str>,
+    slices: Vec<&'a str>,
 }
 
-fn parse(path: &Path) -> Result<Vec<ProfileRow>, String> {
-    let file = File::open(path).map_err(|error| format!("cannot be read ({error})"))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(file);
-    let columns = Columns::of(reader.headers().map_err(|error| broken(&error))?)?;
-    let mut profiles = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| broken(&error))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        profiles.push(columns.row(&record).map_err(|what| format!("line {line}: {what}"))?);
+impl<'a> Labels<'a> {
+    fn push(&mut self, row: &TableRow<'a>, columns: &ProfileColumns) {
+        let add =
+            |labels: &mut Vec<&'a str>, column: Option<usize>| labels.extend(column.map(|column| row.text(column)));
+        add(&mut self.kinds, columns.kind);
+        add(&mut self.categories, columns.category);
+        add(&mut self.slices, columns.slice);
     }
-    if profiles.is_empty() {
-        return Err("has a header but no profiles".to_owned());
-    }
-    Ok(profiles)
-}
 
-fn broken(error: &csv::Error) -> String {
-    let line = error.position().map_or(0, csv::Position::line);
-    let what = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} values, but the header has {expected_len}")
+    /// Numbers the labels of the rows.
+    fn number(&self, rows: &mut [ProfileRow], table: &Table, findings: &mut Vec<Finding>) -> Result<(), TableError> {
+        for (row, slice) in rows.iter_mut().zip(labels::numbered(&self.slices).0) {
+            row.slice = Some(slice);
         }
-        csv::ErrorKind::Utf8 { .. } => "this is not text in UTF-8; is it a CSV file?".to_owned(),
-        _ => error.to_string(),
+        for (row, category) in rows
+            .iter_mut()
+            .zip(indices("category", &self.categories, table, findings)?)
+        {
+            row.category = Some(category);
+        }
+        if is_kind_of_selection(&self.kinds) {
+            let message = "the column `type` has one word, or kinds of selections (ImageJ), and was ignored";
+            findings.push(Finding::new("words-as-numbers", message));
+            return Ok(());
+        }
+        for (row, kind) in rows.iter_mut().zip(indices("type", &self.kinds, table, findings)?) {
+            row.kind = Some(usize::from(kind));
+        }
+        Ok(())
+    }
+}
+
+/// Labels from 0 to 255: themselves, or their numbers in the order of the alphabet.
+fn indices(column: &str, labels: &[&str], table: &Table, findings: &mut Vec<Finding>) -> Result<Vec<u8>, TableError> {
+    if let Some(indices) = labels::indices(labels) {
+        return Ok(indices);
+    }
+    let (numbers, names) = labels::numbered(labels);
+    let numbers: Result<Vec<u8>, _> = numbers.into_iter().map(u8::try_from).collect();
+    let Ok(numbers) = numbers else {
+        let what = format!(
+            "the column `{column}` has {} different labels; at most 256 are possible",
+            names.len()
+        );
+        return Err(table.error(None, what));
     };
-    format!("line {line}: {what}")
+    let shown: Vec<String> = names
+        .iter()
+        .take(8)
+        .enumerate()
+        .map(|(at, name)| format!("{at} = {name}"))
+        .collect();
+    let more = if names.len() > shown.len() { ", ..." } else { "" };
+    let message = format!(
+        "the labels of the column `{column}` were numbered: {}{more}",
+        shown.join(", ")
+    );
+    findings.push(Finding::new("words-as-numbers", message));
+    Ok(numbers)
 }
 
-/// Where the sizes are.
-enum SizeColumn {
-    Size(usize),
-    Area(usize),
+/// Whether a column `type` is that of ImageJ, which names the kind of selection, or does not distinguish anything.
+fn is_kind_of_selection(labels: &[&str]) -> bool {
+    const SELECTIONS: [&str; 12] = [
+        "polygon",
+        "rectangle",
+        "oval",
+        "freehand",
+        "traced",
+        "polyline",
+        "freeline",
+        "straight line",
+        "angle",
+        "composite",
+        "point",
+        "line",
+    ];
+    let words = labels::indices(labels).is_none();
+    let selections = || {
+        labels
+            .iter()
+            .all(|label| SELECTIONS.contains(&label.to_lowercase().as_str()))
+    };
+    words && (labels.iter().all(|label| *label == labels[0]) || selections())
 }
 
-/// Numbers of the columns.
-struct Columns {
-    headers: csv::StringRecord,
-    size: SizeColumn,
-    /// Areas beside sizes.
-    area: Option<usize>,
-    kind: Option<usize>,
-    category: Option<usize>,
-    weight: Option<usize>,
-    slice: Option<usize>,
-    touches_edge: Option<usize>,
-    colour: Option<[usize; 3]>,
-    sides: Option<[usize; 4]>,
-    position: Option<[usize; 2]>,
-}
-
-impl Columns {
-    fn of(headers: &csv::StringRecord) -> Result<Self, String> {
-        let column = |name: &str| {
-            headers
-                .iter()
-                .position(|header| header.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name))
-        };
-        let size = column("size")
-            .map(SizeColumn::Size)
-            .or(column("area").map(SizeColumn::Area));
-        let Some(size) = size else {
-            let found: Vec<_> = headers.iter().take(8).collect();
-            return Err(format!(
-                "line 1 has no column `size` or `area` (it has: {}); a table of profiles begins with a header, such as `size` or `area,category`",
-                if found.is_empty() {
-                    "nothing".to_owned()
-                } else {
-                    found.join(", ")
-                }
-            ));
-        };
-        Ok(Self {
-            area: matches!(size, SizeColumn::Size(_)).then(|| column("area")).flatten(),
-            size,
-            kind: column("type"),
-            category: column("category"),
-            weight: column("weight"),
-            slice: column("slice"),
-            touches_edge: column("touches_edge"),
-            colour: match ["r", "g", "b"].map(column) {
-                [Some(r), Some(g), Some(b)] => Some([r, g, b]),
-                _ => None,
-            },
-            sides: match ["left", "top", "right", "bottom"].map(column) {
-                [Some(left), Some(top), Some(right), Some(bottom)] => Some([left, top, right, bottom]),
-                _ => None,
-            },
-            position: match ["x", "y"].map(column) {
-                [Some(x), Some(y)] => Some([x, y]),
-                _ => None,
-            },
-            headers: headers.clone(),
-        })
+fn profile(row: &TableRow<'_>, columns: &ProfileColumns, scales: &Scales) -> Result<ProfileRow, TableError> {
+    row.check_width()?;
+    let positive = |column: usize, name: &str| match row.number(column)? {
+        value if value > 0.0 => Ok(value),
+        value => Err(row.error(format!("{name} {value} is not above zero"))),
+    };
+    let channel = |column: usize| match row.number(column)? {
+        value @ 0.0..=255.0 => Ok(value / 255.0),
+        value => Err(row.error(format!("{value} is not a colour value from 0 to 255"))),
+    };
+    for (column, name) in [
+        (columns.kind, "type"),
+        (columns.category, "category"),
+        (columns.slice, "slice"),
+    ] {
+        if column.is_some_and(|column| row.text(column).is_empty()) {
+            return Err(row.error(format!("column `{name}` is empty")));
+        }
     }
-
-    fn row(&self, record: &csv::StringRecord) -> Result<ProfileRow, String> {
-        let text = |column: usize| record.get(column).unwrap_or_default();
-        let name = |column: usize| &self.headers[column];
-        let number = |column: usize| match text(column).parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            Ok(_) => Err(format!(
-                "`{}` in column `{}` is not a finite number",
-                text(column),
-                name(column)
-            )),
-            Err(_) => Err(format!(
-                "`{}` in column `{}` is not a number",
-                text(column),
-                name(column)
-            )),
-        };
-        let positive = |column: usize| match number(column)? {
-            value if value > 0.0 => Ok(value),
-            value => Err(format!("{} {value} is not above zero", name(column))),
-        };
-        let channel = |column: usize| match number(column)? {
-            value @ 0.0..=255.0 => Ok(value / 255.0),
-            value => Err(format!("{} {value} is not a colour value from 0 to 255", name(column))),
-        };
-        let index = |column: usize, what: &str| {
-            let value = text(column).parse::<u8>();
-            value.map_err(|_| format!("`{}` is not a {what}: a whole number from 0 to 255", text(column)))
-        };
-        let slice = |column: usize| {
-            let value = text(column).parse::<usize>();
-            value.map_err(|_| format!("`{}` is not a slice: a whole number from 0", text(column)))
-        };
-        let bounding_box = self.sides.map(|sides| bounding_box(sides, number)).transpose()?;
-        // Positions only serve to find clusters: where one is missing there are none.
-        let position = self
-            .position
-            .and_then(|[x, y]| Some([number(x).ok()?, number(y).ok()?]));
-        let centre = |of: BoundingBox| [0.5 * (of.left + of.right), 0.5 * (of.top + of.bottom)];
-        Ok(ProfileRow {
-            size: match self.size {
-                SizeColumn::Size(column) => positive(column)?,
-                SizeColumn::Area(column) => (4.0 * positive(column)? / std::f64::consts::PI).sqrt(),
+    let bounding_box = columns
+        .sides
+        .zip(scales.sides)
+        .map(|(sides, scale)| bounding_box(row, sides, scale))
+        .transpose()?;
+    // Positions only serve to find clusters: where one is missing there are none.
+    let position = columns
+        .position
+        .zip(scales.position)
+        .and_then(|([x, y], scale)| Some([scale * row.number(x).ok()?, scale * row.number(y).ok()?]));
+    let centre = |of: BoundingBox| [0.5 * (of.left + of.right), 0.5 * (of.top + of.bottom)];
+    let (column, measure) = columns.size;
+    Ok(ProfileRow {
+        size: scales.length
+            * match measure {
+                Measure::Size => positive(column, "size")?,
+                Measure::Area => (4.0 * positive(column, "area")? / std::f64::consts::PI).sqrt(),
             },
-            // A missing area leaves nothing to compare.
-            area: self.area.and_then(|column| positive(column).ok()),
-            kind: self
-                .kind
-                .map(|column| index(column, "type").map(usize::from))
-                .transpose()?,
-            slice: self.slice.map(slice).transpose()?,
-            category: self.category.map(|column| index(column, "category")).transpose()?,
-            touches_edge: self.touches_edge.map(|column| truth(text(column))).transpose()?,
-            colour: self
-                .colour
-                .map(|[r, g, b]| Ok::<_, String>([channel(r)?, channel(g)?, channel(b)?]))
-                .transpose()?,
-            bounding_box,
-            position: position.or(bounding_box.map(centre)),
-            weight: match self.weight.map(number).transpose()? {
-                None => 1.0,
-                Some(weight) if weight >= 0.0 => weight,
-                Some(weight) => return Err(format!("weight {weight} is below zero")),
-            },
-        })
-    }
+        // A missing area leaves nothing to compare.
+        area: columns
+            .area
+            .zip(scales.area)
+            .and_then(|(column, scale)| Some(scale * scale * positive(column, "area").ok()?)),
+        kind: None,
+        category: None,
+        slice: None,
+        touches_edge: columns.touches_edge.map(|column| truth(row, column)).transpose()?,
+        colour: columns
+            .colour
+            .map(|[r, g, b]| Ok::<_, TableError>([channel(r)?, channel(g)?, channel(b)?]))
+            .transpose()?,
+        bounding_box,
+        position: position.or(bounding_box.map(centre)),
+        weight: match columns.weight.map(|column| row.number(column)).transpose()? {
+            None => 1.0,
+            Some(weight) if weight >= 0.0 => weight,
+            Some(weight) => return Err(row.error(format!("weight {weight} is below zero"))),
+        },
+    })
 }
 
-fn truth(text: &str) -> Result<bool, String> {
-    match text.to_ascii_lowercase().as_str() {
+fn truth(row: &TableRow<'_>, column: usize) -> Result<bool, TableError> {
+    match row.text(column).to_ascii_lowercase().as_str() {
         "1" | "true" => Ok(true),
         "0" | "false" => Ok(false),
-        other => Err(format!("`{other}` in column `touches_edge` is neither 0 nor 1")),
+        other => Err(row.error(format!("`{other}` in column `touches_edge` is neither 0 nor 1"))),
     }
 }
 
-fn bounding_box(sides: [usize; 4], number: impl Fn(usize) -> Result<f64, String>) -> Result<BoundingBox, String> {
-    let [left, top, right, bottom] = sides;
+fn bounding_box(row: &TableRow<'_>, sides: [usize; 4], scale: f64) -> Result<BoundingBox, TableError> {
+    let [left, top, right, bottom] = sides.map(|side| row.number(side).map(|at| at * scale));
     let of = BoundingBox {
-        left: number(left)?,
-        top: number(top)?,
-        right: number(right)?,
-        bottom: number(bottom)?,
+        left: left?,
+        top: top?,
+        right: right?,
+        bottom: bottom?,
     };
     if of.left < of.right && of.top < of.bottom {
         Ok(of)
     } else {
-        Err("left is not below right, or top is not below bottom".to_owned())
+        Err(row.error("left is not below right, or top is not below bottom"))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::read as read_file;
+    use super::{Headless, ProfileReading, ProfileRow, ProfileTable, read as read_file};
+    use stereology_grid::LengthUnit;
 
-    fn read(text: &str) -> Result<Vec<super::ProfileRow>, String> {
+    fn table(text: impl AsRef<[u8]>, reading: &ProfileReading) -> Result<ProfileTable, String> {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("profiles.csv");
         std::fs::write(&file, text).unwrap();
-        read_file(&file)
-            .map(|table| table.rows)
-            .map_err(|error| error.to_string())
+        read_file(&file, reading).map_err(|error| error.to_string())
+    }
+
+    fn read(text: &str) -> Result<Vec<ProfileRow>, String> {
+        table(text, &ProfileReading::default()).map(|table| table.rows)
+    }
+
+    fn codes(table: &ProfileTable) -> Vec<&'static str> {
+        table.findings.iter().map(|finding| finding.code).collect()
     }
 
     #[test]
@@ -335,11 +375,114 @@ mod tests {
         assert_eq!(read("\u{feff}size\r\n1\r\n").unwrap().len(), 1);
     }
 
+    /// Tables as other programs write them have the sizes of the plain one, and a plain one has no findings.
     #[test]
-    fn each_fault_names_its_line() {
+    fn names_of_other_programs() {
+        let plain = table("size\n2.5\n3\n", &ProfileReading::default()).unwrap();
+        assert!(plain.findings.is_empty());
+        let area = |d: f64| std::f64::consts::FRAC_PI_4 * d * d;
+        let areas = format!("{}\n{}\n", area(2.5), area(3.0));
+        for text in [
+            "2\nFeature_ID,EquivalentDiameters,NumElements\n1,2.5,10\n2,3,10\nFeature_ID,Neighbours\n1,2\n".to_owned(),
+            ",label,equivalent_diameter_area\n0,1,2.5\n1,2,3\n".to_owned(),
+            "ImageNumber,AreaShape_EquivalentDiameter\n1,2.5\n1,3\n".to_owned(),
+            "Image,Grains\nImageNumber,AreaShape_EquivalentDiameter\n1,2.5\n1,3\n".to_owned(),
+            "EqDiam\n\"2,5\"\n3\n".to_owned(),
+            "id;ECD [\u{b5}m]\n1;2,5\n2;3,0\n".to_owned(),
+            "Label\tDiameter\na\t2,5\nb\t3\nMean\t2,75\nSD\t0,3\nMin\t2,5\nMax\t3\n".to_owned(),
+            format!("AreaShape_Area\n{areas}"),
+            format!("Grain: Area \u{b5}m^2\n{areas}"),
+        ] {
+            let found = table(&text, &ProfileReading::default()).unwrap();
+            assert_eq!(found.rows.len(), 2, "{text}");
+            for (row, of) in found.rows.iter().zip(&plain.rows) {
+                assert!((row.size - of.size).abs() < 1e-14, "{text}");
+            }
+            assert!(!found.findings.is_empty(), "{text}");
+        }
+    }
+
+    #[test]
+    fn units_of_the_header_are_converted() {
+        let reading = ProfileReading {
+            unit: Some(LengthUnit::Millimetre),
+            ..ProfileReading::default()
+        };
+        let text =
+            "Area,x [um],left (mm),top (mm),right (mm),bottom (mm)\n[um^2],,,,,\n3141592.653589793,500,0,0,2,2\n";
+        let found = table(text, &reading).unwrap();
+        assert!((found.rows[0].size - 2.0).abs() < 1e-12);
+        assert_eq!(found.rows[0].bounding_box.map(|of| of.right), Some(2.0));
+        assert_eq!(
+            (found.head.unit.unit(), codes(&found)),
+            (reading.unit, vec!["table-unit"])
+        );
+        let found = table(text, &ProfileReading::default()).unwrap();
+        assert!((found.rows[0].size - 2000.0).abs() < 1e-9);
+        assert_eq!(found.head.unit.unit(), Some(LengthUnit::Micrometre));
+        let error = table("# unit=mm\nsize [um]\n1\n", &reading).unwrap_err();
+        assert!(error.contains("another unit"), "{error}");
+        assert!(read("size [um^2]\n1\n").unwrap_err().contains("not that of a length"));
+    }
+
+    #[test]
+    fn labels_are_words_or_numbers_with_gaps() {
+        let text = "size,slice,category,type\n1,20,mica,b\n2,10,quartz,a\n3,20,quartz,b\n";
+        let found = table(text, &ProfileReading::default()).unwrap();
+        let labels: Vec<_> = found
+            .rows
+            .iter()
+            .map(|row| (row.slice, row.category, row.kind))
+            .collect();
+        assert_eq!(
+            labels,
+            [
+                (Some(1), Some(0), Some(1)),
+                (Some(0), Some(1), Some(0)),
+                (Some(1), Some(1), Some(1))
+            ]
+        );
+        assert_eq!(codes(&found), ["words-as-numbers"; 2]);
+        assert!(found.findings[0].message.contains("0 = mica, 1 = quartz"));
+        let imagej = table("size,type\n1,Polygon\n2,Oval\n", &ProfileReading::default()).unwrap();
+        assert_eq!(imagej.rows[0].kind, None);
+    }
+
+    #[test]
+    fn invalid_rows_are_left_out_on_request() {
+        let text = "area,slice\n1,1\nNaN,1\n,2\n-3,2\n4,\n5,3\n";
+        assert!(read(text).unwrap_err().contains("line 3: `NaN` in column `area`"));
+        let reading = ProfileReading {
+            skip_invalid: true,
+            ..ProfileReading::default()
+        };
+        let found = table(text, &reading).unwrap();
+        assert_eq!((found.rows.len(), codes(&found)), (2, vec!["invalid-rows"]));
+        assert!(found.findings[0].message.starts_with("4 rows"), "{:?}", found.findings);
+        assert!(table("area\nNaN\n", &reading).unwrap_err().contains("line 2"));
+    }
+
+    #[test]
+    fn a_column_without_a_header_may_be_sizes() {
+        let reading = ProfileReading {
+            headless: Headless::Sizes,
+            ..ProfileReading::default()
+        };
+        let found = table("1\n2\n3\n", &reading).unwrap();
+        assert_eq!((found.rows.len(), codes(&found)), (3, vec!["table-layout"]));
+        assert!(table("1,2\n3,4\n", &reading).unwrap_err().contains("no column `size`"));
+    }
+
+    #[test]
+    fn each_fault_names_its_line_and_what_was_understood() {
         for (text, what) in [
             ("1\n2\n", "no column `size` or `area`"),
             ("", "no column `size`"),
+            (
+                "id,Feret\n1,2\n",
+                "no column `size` or `area`: `Feret` is a caliper (Feret) diameter",
+            ),
+            ("id,Feret\n1,2\n", "accepted names: size, area, equivalent_diameter"),
             ("size\n", "no profiles"),
             (
                 "size\n1\nnan\n",
@@ -349,16 +492,27 @@ mod tests {
             ("size\n-1\n", "line 2: size -1 is not above zero"),
             ("size\n0\n", "not above zero"),
             ("size\nabc\n", "`abc` in column `size` is not a number"),
-            ("size\n\"\"\n", "is not a number"),
+            ("size,id\n\"\",1\n", "column `size` is empty"),
             ("size,weight\n1,-1\n", "weight -1 is below zero"),
-            ("size,type\n1,x\n", "`x` is not a type"),
+            ("size,type\n1,\n", "column `type` is empty"),
             ("size,type\n1\n", "1 values, but the header has 2"),
+            ("id,size\n1,403,7\n", "3 values, but the header has 2"),
+            (
+                "size;id\n1.5;1\n2,5;2\n",
+                "line 2: `1.5` in column `size` may have a decimal point or a decimal comma",
+            ),
+            (
+                "id;size\n1;x\n2;1,5\n",
+                "line 2: `x` in column `size` is not a number (read as: encoding UTF-8, separator semicolon, decimal mark comma, columns id | size)",
+            ),
+            ("size\n1\n\"2\n3\n", "line 3: a quote (\") is opened but never closed"),
+            ("sep=#\nsize\n1\n", "`sep=#` is not a known separator"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(what), "{text:?}: {error}");
         }
         assert!(
-            read_file(std::path::Path::new("/nowhere/at/all.csv"))
+            read_file("/nowhere/at/all.csv", &ProfileReading::default())
                 .unwrap_err()
                 .to_string()
                 .contains("cannot be read")

@@ -25,7 +25,7 @@ const FILLED: (f64, f64) = (0.25, 1.02);
 ///
 /// let table = std::env::temp_dir().join(format!("radii-{}.csv", std::process::id()));
 /// std::fs::write(&table, "size,area\n1,3.1416\n2,12.566\n3,28.274\n")?;
-/// let found = size_columns::findings(&profiles::read(&table)?.rows);
+/// let found = size_columns::findings(&profiles::read(&table, &profiles::ProfileReading::default())?.rows);
 /// assert!(found[0].code == "area-and-size-disagree" && found[0].message.contains("radii"));
 /// # std::fs::remove_file(table)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -113,13 +113,13 @@ fn repeated(rows: &[ProfileRow]) -> Option<Finding> {
 #[cfg(test)]
 mod tests {
     use super::findings;
-    use crate::files::profiles::read;
+    use crate::files::profiles::{ProfileReading, read};
 
     fn messages(text: &str) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("profiles.csv");
         std::fs::write(&file, text).unwrap();
-        let found = findings(&read(&file).unwrap().rows);
+        let found = findings(&read(&file, &ProfileReading::default()).unwrap().rows);
         found.iter().map(|of| format!("{}: {}", of.code, of.message)).collect()
     }
 

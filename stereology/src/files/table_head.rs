@@ -2,10 +2,7 @@
 //!
 //! Other keys, and comments without a key, are ignored.
 
-use crate::files::FileError;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Write};
-use std::path::Path;
+use std::io::{self, Write};
 use stereology_grid::LengthUnit;
 
 /// The unit of the lengths in a table.
@@ -98,27 +95,12 @@ impl TableHead {
 
 const PIXELS: &str = "px";
 
-/// Reads the head of a table; empty if the table has none.
-///
-/// # Errors
-///
-/// [`FileError`] with the line: a value that is not a positive number, an unknown unit, a file that cannot be read.
-pub fn read(path: impl AsRef<Path>) -> Result<TableHead, FileError> {
-    let path = path.as_ref();
-    let file = File::open(path).map_err(|error| FileError::value(path, format!("cannot be read ({error})")))?;
-    parse(BufReader::new(file)).map_err(|what| FileError::value(path, what))
-}
-
-fn parse(table: impl BufRead) -> Result<TableHead, String> {
+/// The head in comment lines with their line numbers; empty if they state nothing. An error names the line.
+pub(super) fn of_comments<'a>(comments: impl Iterator<Item = (usize, &'a str)>) -> Result<TableHead, String> {
     let mut head = TableHead::default();
     let (mut width, mut height) = (None, None);
-    for (index, line) in table.split(b'\n').enumerate() {
-        let line = line.map_err(|error| format!("cannot be read ({error})"))?;
-        // Text that is not UTF-8 is refused where the rows are read.
-        let Ok(line) = str::from_utf8(&line) else { break };
-        let Some(comment) = line.trim_start_matches('\u{feff}').trim().strip_prefix('#') else {
-            break;
-        };
+    for (line, comment) in comments {
+        let comment = comment.trim_start_matches('#');
         let Some((key, value)) = comment.split_once('=') else {
             continue;
         };
@@ -126,8 +108,7 @@ fn parse(table: impl BufRead) -> Result<TableHead, String> {
         let number = || match value.parse::<f64>() {
             Ok(number) if number.is_finite() && number > 0.0 => Ok(Some(number)),
             _ => Err(format!(
-                "line {}: `{value}` is not a valid {key}: a finite number above zero is needed",
-                index + 1
+                "line {line}: `{value}` is not a valid {key}: a finite number above zero is needed"
             )),
         };
         match key {
@@ -140,7 +121,7 @@ fn parse(table: impl BufRead) -> Result<TableHead, String> {
                 head.unit = match value {
                     "" => TableUnit::Unknown,
                     PIXELS => TableUnit::Pixels,
-                    unit => TableUnit::Unit(unit.parse().map_err(|error| format!("line {}: {error}", index + 1))?),
+                    unit => TableUnit::Unit(unit.parse().map_err(|error| format!("line {line}: {error}"))?),
                 }
             }
             _ => {}
@@ -152,9 +133,14 @@ fn parse(table: impl BufRead) -> Result<TableHead, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{TableHead, TableUnit, parse};
+    use super::{TableHead, TableUnit, of_comments};
     use proptest::prelude::*;
     use stereology_grid::LengthUnit;
+    use stereology_shape::TableSource;
+
+    fn parse(text: &[u8]) -> Result<TableHead, String> {
+        of_comments(TableSource::default().parse(text).unwrap().comments())
+    }
 
     proptest! {
         /// A head that is written is read back bit for bit.

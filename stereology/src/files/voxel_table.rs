@@ -3,9 +3,11 @@
 //! begin with `#` are ignored.
 
 use crate::files::FileError;
+use crate::files::delimited::{Opened, ReadTable};
 use std::io::Write;
 use std::path::Path;
 use stereology_grid::write_atomically;
+use stereology_shape::{Table, TableError};
 
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,70 +68,66 @@ pub fn write(path: impl AsRef<Path>, rows: &[ValueRow]) -> Result<(), FileError>
 /// # Errors
 ///
 /// [`FileError`] with the line: a header without x, y, z, another number of values, values outside `range`, no rows.
-pub fn read(path: impl AsRef<Path>, channels: usize, range: ValueRange) -> Result<Vec<ValueRow>, FileError> {
+pub fn read(path: impl AsRef<Path>, channels: usize, range: ValueRange) -> Result<ReadTable<ValueRow>, FileError> {
     let path = path.as_ref();
-    parse(path, channels, range).map_err(|what| FileError::value(path, what))
+    Opened::read(path, &["x", "y", "z"])?.into_rows(path, |table, _, _| values(table, channels, range))
 }
 
-fn parse(path: &Path, channels: usize, range: ValueRange) -> Result<Vec<ValueRow>, String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| error.to_string())?;
-    let (mut rows, mut columns) = (Vec::new(), None);
-    for record in reader.records() {
-        let record = record.map_err(|error| error.to_string())?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let numbers: Option<Vec<f64>> = record.iter().map(|field| field.parse().ok()).collect();
-        let Some(numbers) = numbers.filter(|n| n.iter().all(|v| v.is_finite())) else {
-            if columns.is_none() && rows.is_empty() {
-                columns = Some(
-                    named(&record).ok_or("its header has no columns x, y, z; name them, or leave the header out")?,
-                );
-                continue;
-            }
-            return Err(format!("line {line}: not a row of finite numbers"));
-        };
-        if numbers.len() != 3 + channels {
-            return Err(format!(
-                "line {line}: {} numbers; x, y, z and {channels} value(s) are needed, one per channel of the image",
-                numbers.len()
-            ));
+fn values(table: &Table, channels: usize, range: ValueRange) -> Result<Vec<ValueRow>, TableError> {
+    let columns = columns(table, channels)?;
+    let mut rows = Vec::new();
+    for row in table.rows() {
+        let count = row.fields().count();
+        if count != 3 + channels {
+            return Err(row.error(format!(
+                "{count} numbers; x, y, z and {channels} value(s) are needed, one per channel of the image"
+            )));
         }
-        let columns = columns.clone().unwrap_or_else(|| (0..3 + channels).collect());
-        // A header may be shorter than the rows.
-        let Some(ordered) = columns
+        if columns.len() != count {
+            return Err(row.error(format!("{count} numbers under a header of {} columns", columns.len())));
+        }
+        let numbers: Vec<f64> = columns
             .iter()
-            .map(|&column| numbers.get(column).copied())
-            .collect::<Option<Vec<f64>>>()
-            .filter(|ordered| ordered.len() == numbers.len())
-        else {
-            return Err(format!(
-                "line {line}: {} numbers under a header of {} columns",
-                numbers.len(),
-                columns.len()
-            ));
-        };
-        let (place, values) = ordered.split_at(3);
+            .map(|column| row.number(*column))
+            .collect::<Result<_, _>>()?;
+        let (place, values) = numbers.split_at(3);
         let byte = |v: &f64| v.fract() == 0.0 && (0.0..=255.0).contains(v);
         if range == ValueRange::Bytes && !values.iter().all(byte) {
-            return Err(format!(
-                "line {line}: values {values:?}; those of an image are whole numbers from 0 to 255"
-            ));
+            return Err(row.error(format!(
+                "values {values:?}; those of an image are whole numbers from 0 to 255"
+            )));
         }
         rows.push(ValueRow {
-            line,
+            line: row.line() as u64,
             place: [place[0], place[1], place[2]],
             values: values.iter().map(|&v| single(v)).collect(),
         });
     }
     if rows.is_empty() {
-        return Err("holds no measurement".to_owned());
+        return Err(table.error(None, "holds no measurement"));
     }
     Ok(rows)
+}
+
+/// Columns of x, y, z and then of the values.
+fn columns(table: &Table, channels: usize) -> Result<Vec<usize>, TableError> {
+    let count = table.columns().len();
+    if count == 0 {
+        return Ok((0..3 + channels).collect());
+    }
+    let column = |name: &str| table.column(&[name]);
+    let (Some(x), Some(y), Some(z)) = (column("x")?, column("y")?, column("z")?) else {
+        return Err(table.error(
+            None,
+            "its header has no columns x, y, z; name them, or leave the header out",
+        ));
+    };
+    let place = [x, y, z];
+    let values = match (column("r")?, column("g")?, column("b")?) {
+        (Some(r), Some(g), Some(b)) if count == 6 => vec![r, g, b],
+        _ => (0..count).filter(|column| !place.contains(column)).collect(),
+    };
+    Ok(place.into_iter().chain(values).collect())
 }
 
 /// A whole number from 0, below the size of an array.
@@ -146,16 +144,4 @@ fn whole(value: f64) -> usize {
 #[allow(clippy::cast_possible_truncation, reason = "rounding is meant")]
 fn single(value: f64) -> f32 {
     value as f32
-}
-
-/// Columns of x, y, z and then of the values, by a header.
-fn named(header: &csv::StringRecord) -> Option<Vec<usize>> {
-    let column = |name: &str| header.iter().position(|field| field.eq_ignore_ascii_case(name));
-    let place = [column("x")?, column("y")?, column("z")?];
-    let rest = || (0..header.len()).filter(|i| !place.contains(i));
-    let values = match [column("r"), column("g"), column("b")] {
-        [Some(r), Some(g), Some(b)] if header.len() == 6 => vec![r, g, b],
-        _ => rest().collect(),
-    };
-    Some(place.into_iter().chain(values).collect())
 }

@@ -6,6 +6,7 @@ use ndarray::{Array2, Array4};
 use proptest::prelude::*;
 use stereology::files::densities::DensityRows;
 use stereology::files::packing::PackingFile;
+use stereology::files::profiles::ProfileReading;
 use stereology::files::voxel_table::{ValueRange, ValueRow};
 use stereology::files::{densities, particle_table, profiles, solid as solid_files, voxel_table, vtp, xyz};
 use stereology::grid::LengthUnit;
@@ -55,7 +56,7 @@ proptest! {
         let period = PeriodicBox::new(Vector3::new(8.0, 9.0, 10.0)).unwrap();
         let arrangement = Arrangement::new(bodies, particles.clone(), period).unwrap();
         particle_table::write(at("p.csv"), &particles, Some(LengthUnit::Micrometre)).unwrap();
-        prop_assert_eq!(&particle_table::read(at("p.csv")).unwrap(), &particles);
+        prop_assert_eq!(&particle_table::read(at("p.csv")).unwrap().rows, &particles);
         vtp::write(at("p.vtp"), &particles).unwrap();
         prop_assert_eq!(&vtp::read(at("p.vtp")).unwrap(), &particles);
         xyz::write(at("p.xyz"), &arrangement).unwrap();
@@ -76,8 +77,9 @@ proptest! {
         }
         rows.write(&path).unwrap();
         match densities::read(&path) {
-            Ok(found) => {
-                prop_assert_eq!(found.len(), 2);
+            Ok(table) => {
+                let found = table.rows;
+                prop_assert_eq!((found.len(), table.head.unit.unit()), (2, Some(LengthUnit::Millimetre)));
                 for (category, (found, part)) in found.iter().zip(density.chunks(4)).enumerate() {
                     prop_assert_eq!((found.shape, usize::from(found.category)), (Some(0), category));
                     prop_assert_eq!(&found.edges, &edges);
@@ -101,7 +103,7 @@ proptest! {
         let rows: Vec<ValueRow> = places.iter().enumerate().map(row).collect();
         voxel_table::write(&path, &rows).unwrap();
         let range = if whole { ValueRange::Bytes } else { ValueRange::Any };
-        prop_assert_eq!(&voxel_table::read(&path, channels, range).unwrap(), &rows);
+        prop_assert_eq!(&voxel_table::read(&path, channels, range).unwrap().rows, &rows);
         if whole {
             let [x, y, z] = rows[0].place.map(|x| x as usize);
             prop_assert_eq!(rows[0].voxel([50; 3]), Some([z, y, x]));
@@ -127,7 +129,8 @@ proptest! {
         let path = folder.path().join("profiles.csv");
         let head = profiles::head(&found, scale, Some(LengthUnit::Inch), EdgeRule::All);
         profiles::write(&path, &found, scale, &head).unwrap();
-        let table = profiles::read(&path).unwrap();
+        let table = profiles::read(&path, &ProfileReading::default()).unwrap();
+        prop_assert_eq!(&table.findings, &[]);
         prop_assert_eq!(&table.head, &head);
         let read = table.rows;
         prop_assert_eq!(read.len(), found.profiles.len());

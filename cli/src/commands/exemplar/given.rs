@@ -17,7 +17,7 @@ use crate::warnings::Warning;
 const MOST: usize = 65_536;
 
 /// Reads voxels from rows of x, y, z and `channels` values from 0 to 255, which are divided by `scale`.
-pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel>, Failure> {
+pub fn voxels(path: &Path, channels: usize, scale: f32, notes: &mut Notes) -> Result<Vec<FixedVoxel>, Failure> {
     let voxel = |row: ValueRow| {
         let Some([z, y, x]) = row.voxel([MOST; 3]) else {
             let [x, y, z] = row.place;
@@ -29,11 +29,11 @@ pub fn voxels(path: &Path, channels: usize, scale: f32) -> Result<Vec<FixedVoxel
         };
         Ok(([z, y, x], row.values.iter().map(|v| v / scale).collect()))
     };
-    voxel_table::read(path, channels, ValueRange::Bytes)
-        .or_fail()?
-        .into_iter()
-        .map(voxel)
-        .collect()
+    let table = voxel_table::read(path, channels, ValueRange::Bytes).or_fail()?;
+    for finding in table.findings {
+        notes.warn(finding);
+    }
+    table.rows.into_iter().map(voxel).collect()
 }
 
 /// Reads the mask: an array of the solid's size, or a mesh that is scaled to fit the box and centred.

@@ -38,9 +38,10 @@ pub fn read(
     channels: usize,
     range: ValueRange,
 ) -> Result<Measurements, Failure> {
-    let rows = voxel_table::read(path, channels, range).or_fail()?;
+    let table = voxel_table::read(path, channels, range).or_fail()?;
+    let rows = table.rows;
     let in_mesh = || in_mesh(path, &rows, voxels);
-    let found = match unit {
+    let mut found = match unit {
         Unit::Mesh => in_mesh()?,
         Unit::Voxels => in_voxels(path, &rows, voxels)?,
         Unit::Auto => match in_mesh() {
@@ -55,6 +56,7 @@ pub fn read(
             }
         },
     };
+    found.warnings.extend(table.findings);
     Ok(found)
 }
 

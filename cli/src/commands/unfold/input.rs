@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use stereology::files::profiles::{self, ProfileRow};
+use stereology::files::profiles::{self, ProfileReading, ProfileRow};
 use stereology::files::table_head::{TableHead, TableUnit};
 use stereology::grid::LengthUnit;
+use stereology::pipeline::Finding;
 use stereology_report::significant;
 
 use crate::everywhere::Everywhere;
@@ -18,6 +19,8 @@ pub struct Input {
     pub rows: Vec<ProfileRow>,
     /// What the head of the table states.
     pub head: TableHead,
+    /// What was found about its layout.
+    pub findings: Vec<Finding>,
 }
 
 /// Options that repeat or replace values of the head, in the unit of the table.
@@ -47,7 +50,7 @@ pub fn repeats(given: Option<f64>, stated: Option<f64>) -> bool {
 
 impl Input {
     /// Reads a table, or `profiles.csv` of a folder.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path, reading: &ProfileReading) -> Result<Self, Failure> {
         let path = if path.is_dir() {
             let table = path.join("profiles.csv");
             if !table.is_file() {
@@ -60,11 +63,12 @@ impl Input {
         } else {
             path.to_owned()
         };
-        let table = profiles::read(&path).at(&path)?;
+        let table = profiles::read(&path, reading).at(&path)?;
         Ok(Self {
             path,
             rows: table.rows,
             head: table.head,
+            findings: table.findings,
         })
     }
 

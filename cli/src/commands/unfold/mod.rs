@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use stereology::files::profiles::ProfileRow;
+use stereology::files::profiles::{Headless, ProfileReading, ProfileRow};
 use stereology::files::{densities, size_columns};
 use stereology::grid::LengthUnit;
 use stereology::pipeline::{
@@ -53,8 +53,11 @@ const OF_SEGMENT: Defaults = Defaults {
 /// table may begin with lines `# key=value`: area, min_size, unit, edge_rule, width, height. `segment` writes them, and
 /// unfolding takes area, threshold, unit and edge rule from them. An option that contradicts them is an error.
 ///
-/// The table has a column `size` (equivalent circular diameter) or `area`. The columns `type` (0-based index of
-/// --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; other columns are ignored.
+/// The table has a column `size` (equivalent circular diameter) or `area`, or another name of these that ImageJ,
+/// scikit-image, CellProfiler, DREAM.3D, GrainSizeTools or QuPath gives them. Separator, encoding and decimal mark are
+/// found, and reported unless the table is plain; units in the header are converted to --unit. The columns `type` (0-based
+/// index of --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; types, categories and
+/// slices may be words. Other columns are ignored.
 /// --area is the total area examined, which absolute numbers require. Profiles at the edges of a slice count by their
 /// `weight`, or by --edge-rule, which needs the bounding box of each profile in the columns `left`, `top`, `right`,
 /// `bottom`, and the size of a slice.
@@ -97,6 +100,10 @@ pub struct Unfold {
     /// Estimate the fractions of several --shape from the profiles; refused if the profiles do not determine them
     #[arg(long, help_heading = "Unfolding")]
     pub unknown_fractions: bool,
+    /// Leave out rows with invalid values (NaN, empty, not above zero), which are counted in a warning, instead of
+    /// refusing the table
+    #[arg(long)]
+    pub skip_invalid: bool,
     /// Also write the densities as a table: lower_edge,upper_edge,number_density,lower,upper,type,category
     #[arg(short, long, value_name = "densities.csv")]
     pub output: Option<Output>,
@@ -219,10 +226,17 @@ impl Unfold {
             .as_ref()
             .map(|output| everywhere.outputs.file(output))
             .transpose()?;
-        let input = Input::read(&self.profiles)?;
+        let reading = ProfileReading {
+            // A length per pixel is no unit of the table.
+            unit: everywhere.unit.filter(|_| everywhere.scale_given.is_none()),
+            skip_invalid: self.skip_invalid,
+            headless: Headless::Refused,
+        };
+        let mut input = Input::read(&self.profiles, &reading)?;
         let unit = input.unit(everywhere)?;
         let stated = input.head.min_size;
-        let mut remarks = size_columns::findings(&input.rows);
+        let mut remarks = std::mem::take(&mut input.findings);
+        remarks.extend(size_columns::findings(&input.rows));
         remarks.extend(self.without_effect());
         let measured = self.measured(input, everywhere.scale)?;
         let types = self.choices.types()?;

@@ -13,6 +13,7 @@ mod schemas;
 mod small_commands;
 mod solid;
 mod stones;
+mod tables;
 mod unfolding;
 
 use std::path::Path;

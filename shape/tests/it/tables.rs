@@ -231,6 +231,21 @@ fn what_does_not_decide_is_reported() {
     }
 }
 
+/// Blanks inside fields separate nothing where commas do.
+#[test]
+fn words_with_blanks_are_single_fields() {
+    for text in [
+        "area,slice\n2.5,section 1\n",
+        "place,area\n1 2,2.5\n",
+        "id a,area\n2,2.5\n",
+        "a b c,area\nd e f,2.5\n",
+    ] {
+        let table = read(text.as_bytes()).unwrap();
+        let area = table.column(&["area"]).unwrap().unwrap();
+        assert_eq!(table.rows().next().unwrap().number(area), Ok(2.5), "{text}");
+    }
+}
+
 #[test]
 fn rows_of_statistics_are_left_out_and_reported() {
     let text = "Label,Area\na,1\nMin,2\nb,3\nMean,2\nSD,1\nMin,1\nMax,3\n";

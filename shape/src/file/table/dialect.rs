@@ -112,7 +112,7 @@ pub(super) fn separator(text: &str, comments: Comments) -> Separator {
 /// Rows that agree on a separator.
 struct Split {
     separator: Separator,
-    /// Fraction of the fields that are numbers in some notation.
+    /// Fraction of the fields of rows with numbers that are numbers in some notation.
     numeric: f64,
 }
 
@@ -140,15 +140,20 @@ impl Split {
         {
             let names = cells.width(header);
             let row_names = matches!(separator, Separator::Tab | Separator::Blanks) && names + 1 == width;
-            if names.abs_diff(width) > 1 || (names < 2 && !row_names) {
+            // Names between commas are not one name, whatever blanks there are.
+            let others = separator == Separator::Blanks && cells.row(header).any(|name| name.contains([',', ';', '|']));
+            if names.abs_diff(width) > 1 || (names < 2 && !row_names) || others {
                 return None;
             }
         }
-        let agreeing = rows.filter(|row| cells.width(*row) == width);
-        let numeric: usize = agreeing.map(numbers).sum();
+        let (mut numeric, mut fields) = (0, 0);
+        for row in rows.filter(data) {
+            numeric += numbers(row);
+            fields += width;
+        }
         Some(Self {
             separator,
-            numeric: numeric as f64 / (agree * width) as f64,
+            numeric: numeric as f64 / fields.max(1) as f64,
         })
     }
 }

@@ -1,5 +1,5 @@
-//! Random changes of small mesh files, raw meshes and tables, for a number of seconds: `mutate [SECONDS] [SEED]`. A case
-//! that fails is written to `mutate-failure.bin`, and its target is printed.
+//! Random changes of small mesh files, raw meshes and tables, for a number of seconds: `mutate [SECONDS] [SEED]`. A
+//! case that fails is written to `mutate-failure.bin`, and its target is printed.
 
 use std::panic::catch_unwind;
 use std::time::{Duration, Instant};

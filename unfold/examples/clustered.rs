@@ -12,7 +12,7 @@
     reason = "a study prints its table; counts are far below 2^53"
 )]
 
-#[path = "common/spheres.rs"]
+#[path = "designs/spheres.rs"]
 mod spheres;
 
 use rand::{RngExt, SeedableRng};

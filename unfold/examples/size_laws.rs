@@ -14,9 +14,9 @@
     reason = "a study prints its table; counts are far below 2^53"
 )]
 
-#[path = "common/laws.rs"]
+#[path = "designs/laws.rs"]
 mod laws;
-#[path = "common/spheres.rs"]
+#[path = "designs/spheres.rs"]
 mod spheres;
 
 use laws::Law;

@@ -70,8 +70,8 @@ pub struct Pack {
     /// Maximum number of iterations; with --mode sequential, of positions tried for one particle
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count)]
     pub iterations: usize,
-    /// Leave out rows of --sizes with invalid values (NaN, empty, not above zero), which are counted in a warning,
-    /// instead of refusing the table
+    /// Leave out rows of --sizes with invalid values (empty, words, not above zero), which are counted in a warning,
+    /// instead of refusing the table; rows whose size is NaN are always left out
     #[arg(long)]
     pub skip_invalid: bool,
     /// Also compute statistics of the packing: radial distribution, order, orientations, sections

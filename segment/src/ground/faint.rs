@@ -166,9 +166,9 @@ mod tests {
     #[test]
     fn steps_of_hue_are_no_regions() {
         // Of quality 40: 21 for hue, in coefficients that are eight times the mean over a block.
-        let step = 21.0 / 8.0 / 255.0;
+        let step = 21.0_f32 / 8.0 / 255.0;
         let compression = Compression {
-            errors: [0.5, 1.0, 1.0].map(|steps| steps * step * (6.0_f64 / 12.0).sqrt()),
+            errors: [0.5, 1.0, 1.0].map(|steps| steps * f64::from(step) * (6.0_f64 / 12.0).sqrt()),
             subsampling: [2, 2],
         };
         let mask = Array2::from_elem((256, 256), false);
@@ -182,7 +182,7 @@ mod tests {
                     0.0
                 };
                 let texture = 0.02 * rng.random::<f32>();
-                [1.402, -1.058, 1.772].map(|c| 0.5 + texture + c * hue * step as f32)
+                [1.402, -1.058, 1.772].map(|c| 0.5 + texture + c * hue * step)
             });
             let binder = BinderModel::fit(&image, 0);
             let faint = faint_regions(&image, &binder, &mask, [3.5, 6.3], compression);

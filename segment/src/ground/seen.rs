@@ -40,7 +40,7 @@ const TWO_TONES: f64 = 1.55;
 /// Slope of the borders between two tones from which they are edges, as a fraction of that of a step with the photo's
 /// point spread: 0.4 to 0.5 occurs in shaded pebbles, 0.8 to 0.95 in tomograms and thin sections.
 const TONE_EDGE: f32 = 0.6;
-/// Variance, pixels², of the blur that differences over two pixels beside a border amount to; the slopes of steps blurred
+/// Variance, pixels², of the blur that differences over two pixels beside a border amount to; slopes of steps blurred
 /// by 0.5 to 1.5 pixels are correct within 1 % with it.
 const DIFFERENCES: f32 = 0.62;
 

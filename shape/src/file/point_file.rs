@@ -12,8 +12,8 @@ use crate::file::table::{Table, TableError, TableRow, TableSource};
 ///
 /// A text file is delimited text ([`Table`]): a header names the columns x, y and z, also with units of length, as
 /// `Points:0` (ParaView) or `centroid-2` (scikit-image); other columns are ignored. Without a header the first three
-/// columns are x, y, z, unless the first numbers the rows. Lines that begin with `#` or `//` are comments, or the header
-/// (CloudCompare); the number of points may precede the rows.
+/// columns are x, y, z, unless the first numbers the rows. Lines that begin with `#` or `//` are comments, or the
+/// header (CloudCompare); the number of points may precede the rows.
 ///
 /// # Errors
 ///

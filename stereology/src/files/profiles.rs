@@ -1,6 +1,6 @@
-//! `profiles.csv`: a table of profiles with a header. `size` or `area`, or another name of these, is required; `type`, `category`, `weight`,
-//! `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are optional, other columns are
-//! ignored. The table may begin with lines `# key=value` ([`table_head`]).
+//! `profiles.csv`: a table of profiles with a header. `size` or `area`, or another name of these, is required; `type`,
+//! `category`, `weight`, `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are
+//! optional, other columns are ignored. The table may begin with lines `# key=value` ([`table_head`]).
 
 use crate::files::FileError;
 use crate::files::delimited::{Opened, ReadTable};
@@ -113,15 +113,15 @@ pub type ProfileTable = ReadTable<ProfileRow>;
 pub struct ProfileReading {
     /// The unit to which lengths are converted if the header states theirs.
     pub unit: Option<LengthUnit>,
-    /// Rows with an invalid value, such as NaN, are left out and counted, in place of an error.
+    /// Rows with an invalid value are left out and counted, in place of an error; those whose size is NaN always are.
     pub skip_invalid: bool,
     /// A table without a header.
     pub headless: Headless,
 }
 
 /// Reads a table of profiles; areas are converted to equivalent circular diameters, √(4 A / π). It is delimited text of
-/// any kind ([`Table`]), with the names of columns that ImageJ, scikit-image, CellProfiler, DREAM.3D, GrainSizeTools and
-/// QuPath use.
+/// any kind ([`Table`]), with the names of columns that ImageJ, scikit-image, CellProfiler, DREAM.3D, GrainSizeTools
+/// and QuPath use.
 ///
 /// Slices, categories and types may be words or any numbers. Slices are numbered from 0 without gaps; so are
 /// categories and types that are not whole numbers from 0 to 255, in alphabetical order.
@@ -138,13 +138,16 @@ pub fn read(path: impl AsRef<Path>, reading: &ProfileReading) -> Result<ProfileT
         let mut rows = Vec::new();
         let mut labels = Labels::default();
         let (mut invalid, mut first_fault) = (0_usize, None);
+        // A program writes NaN for the size of what it could not measure: there is no profile.
+        let (size, _) = columns.size;
+        let is_unmeasured = |row: &TableRow<'_>| row.text(size).eq_ignore_ascii_case("nan");
         for row in table.rows() {
             match profile(&row, &columns, &scales) {
                 Ok(profile) => {
                     rows.push(profile);
                     labels.push(&row, &columns);
                 }
-                Err(fault) if reading.skip_invalid => {
+                Err(fault) if reading.skip_invalid || is_unmeasured(&row) => {
                     invalid += 1;
                     first_fault.get_or_insert(fault);
                 }
@@ -451,7 +454,10 @@ mod tests {
     #[test]
     fn invalid_rows_are_left_out_on_request() {
         let text = "area,slice\n1,1\nNaN,1\n,2\n-3,2\n4,\n5,3\n";
-        assert!(read(text).unwrap_err().contains("line 3: `NaN` in column `area`"));
+        assert!(read(text).unwrap_err().contains("line 4"));
+        let unmeasured = table("area,slice\n1,1\nNaN,1\n5,3\n", &ProfileReading::default()).unwrap();
+        assert_eq!((unmeasured.rows.len(), codes(&unmeasured)), (2, vec!["invalid-rows"]));
+        assert!(read("area,weight\n1,1\n2,NaN\n").unwrap_err().contains("line 3: `NaN`"));
         let reading = ProfileReading {
             skip_invalid: true,
             ..ProfileReading::default()

@@ -55,9 +55,9 @@ const OF_SEGMENT: Defaults = Defaults {
 ///
 /// The table has a column `size` (equivalent circular diameter) or `area`, or another name of these that ImageJ,
 /// scikit-image, CellProfiler, DREAM.3D, GrainSizeTools or QuPath gives them. Separator, encoding and decimal mark are
-/// found, and reported unless the table is plain; units in the header are converted to --unit. The columns `type` (0-based
-/// index of --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; types, categories and
-/// slices may be words. Other columns are ignored.
+/// found, and reported unless the table is plain; units in the header are converted to --unit. The columns `type`
+/// (0-based index of --shape), `category`, `weight` (multiplies the count) and `slice` are used if present; types,
+/// categories and slices may be words. Other columns are ignored.
 /// --area is the total area examined, which absolute numbers require. Profiles at the edges of a slice count by their
 /// `weight`, or by --edge-rule, which needs the bounding box of each profile in the columns `left`, `top`, `right`,
 /// `bottom`, and the size of a slice.
@@ -100,8 +100,8 @@ pub struct Unfold {
     /// Estimate the fractions of several --shape from the profiles; refused if the profiles do not determine them
     #[arg(long, help_heading = "Unfolding")]
     pub unknown_fractions: bool,
-    /// Leave out rows with invalid values (NaN, empty, not above zero), which are counted in a warning, instead of
-    /// refusing the table
+    /// Leave out rows with invalid values (empty, words, not above zero), which are counted in a warning, instead of
+    /// refusing the table; rows whose size is NaN are always left out
     #[arg(long)]
     pub skip_invalid: bool,
     /// Also write the densities as a table: lower_edge,upper_edge,number_density,lower,upper,type,category

@@ -4,7 +4,7 @@
 //! readers take the rest of the file as one field; lines are those of the file, comments and empty rows included; and
 //! fields may be separated by any number of blanks.
 
-use super::dialect::Separator;
+use super::separator::Separator;
 
 /// The fields of a table, row by row.
 #[derive(Clone, Debug, Default)]

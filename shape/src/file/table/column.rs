@@ -36,8 +36,8 @@ impl Column {
         }
     }
 
-    /// Whether the column has this name, which is written in lower case without other signs than letters and digits. The
-    /// name of an object before a colon (`Nucleus: Area`) is no part of the name.
+    /// Whether the column has this name, which is written in lower case without other signs than letters and digits.
+    /// The name of an object before a colon (`Nucleus: Area`) is no part of the name.
     #[must_use]
     pub fn is(&self, name: &str) -> bool {
         self.bare == name || self.whole == name || self.behind_object.as_deref() == Some(name)

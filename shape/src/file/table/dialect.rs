@@ -1,55 +1,10 @@
 //! The separator of a table: by its line `sep=`, or by which separator gives rows of equal length that hold numbers.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use super::cells::{Cells, Comments};
 use super::numbers::{is_number, looks_like_a_number};
-
-/// What stands between the fields of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Separator {
-    /// Nothing: a table of one column.
-    None,
-    /// A comma.
-    Comma,
-    /// A semicolon.
-    Semicolon,
-    /// A tab.
-    Tab,
-    /// A vertical bar.
-    Bar,
-    /// Any number of blanks and tabs.
-    Blanks,
-}
-
-impl Separator {
-    /// Whether the character separates fields.
-    pub(super) fn is(self, c: char) -> bool {
-        match self {
-            Self::None => false,
-            Self::Comma => c == ',',
-            Self::Semicolon => c == ';',
-            Self::Tab => c == '\t',
-            Self::Bar => c == '|',
-            Self::Blanks => c == ' ' || c == '\t',
-        }
-    }
-}
-
-impl fmt::Display for Separator {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Comma => "comma",
-            Self::Semicolon => "semicolon",
-            Self::Tab => "tab",
-            Self::Bar => "vertical bar",
-            Self::Blanks => "blanks",
-        })
-    }
-}
+use super::separator::Separator;
 
 /// Rows by which the separator is found.
 const SAMPLE: usize = 100;

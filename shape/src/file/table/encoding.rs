@@ -66,8 +66,8 @@ fn is_control(c: char) -> bool {
     c < ' ' && !matches!(c, '\t' | '\n' | '\u{c}')
 }
 
-/// Whether most of the bytes at even, and at odd, places of the beginning are zero: in UTF-16, Latin letters have them at
-/// one kind of place.
+/// Whether most of the bytes at even, and at odd, places of the beginning are zero: in UTF-16, Latin letters have them
+/// at one kind of place.
 fn zeros(bytes: &[u8]) -> [bool; 2] {
     let (pairs, _) = bytes[..bytes.len().min(4096)].as_chunks::<2>();
     [0, 1].map(|at| 2 * pairs.iter().filter(|pair| pair[at] == 0).count() > pairs.len())

@@ -2,8 +2,8 @@
 
 use super::cells::{Cells, Comments};
 use super::column::{Column, units_row};
-use super::dialect::Separator;
 use super::numbers::is_number;
+use super::separator::Separator;
 
 /// Names of the columns, and the rows below them.
 #[derive(Clone, Debug, Default)]

@@ -8,6 +8,7 @@ mod dialect;
 mod encoding;
 mod header;
 mod numbers;
+mod separator;
 mod summary_rows;
 
 use std::io::Read;
@@ -15,11 +16,11 @@ use std::path::Path;
 
 use cells::{Cells, Comments};
 pub use column::{Column, ColumnUnit};
-pub use dialect::Separator;
 pub use encoding::TextEncoding;
 use header::Header;
 pub use numbers::DecimalMark;
 use numbers::Numbers;
+pub use separator::Separator;
 
 /// Delimited text: names of columns, and rows of fields.
 ///
@@ -27,7 +28,7 @@ use numbers::Numbers;
 /// accepted where it is unambiguous, and [`Table::format`] reports it:
 ///
 /// - UTF-8 with or without byte order mark, UTF-16, Latin-1; line ends of any system; a line `sep=;`.
-/// - Comma, semicolon, tab, vertical bar or blanks between fields; quotes, with separators, line ends and doubled quotes
+/// - Comma, semicolon, tab, vertical bar or blanks between fields; quotes, with separators, line ends, doubled quotes
 ///   in them; separators at the end of rows; empty rows; comments that begin with `#`.
 /// - Decimal point or comma, decided by all columns, and marks between thousands.
 /// - Units in the header or in a row below it, titles and the number of rows above it, a header in a comment, rows of

@@ -15,7 +15,7 @@
 use std::fmt;
 
 use super::cells::Cells;
-use super::dialect::Separator;
+use super::separator::Separator;
 
 /// The mark between the whole part and the fraction of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -445,7 +445,7 @@ fn hulls_of_points_in_text_files() {
     for (spec, says) in [
         (write("flat.csv", "0,0,0\n1,0,0\n0,1,0\n1,1,0\n"), "one plane"),
         (write("few.csv", "0,0,0\n1,0,0\n"), "at least four points"),
-        (write("words.csv", "x,y,z\n1,2,3\n1,two,3\n"), "line 3: \"two\""),
+        (write("words.csv", "x,y,z\n1,2,3\n1,two,3\n"), "line 3: `two`"),
         (format!("hull:{}", path(&folder, "none.csv")), "none.csv"),
     ] {
         let (code, _, error) = stereology(&["kmatrix", &spec]);

@@ -111,15 +111,19 @@ fn slices_are_labels() {
 fn invalid_rows_are_refused_or_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let (file, out) = (path(&folder, "table.csv"), path(&folder, "packing.json"));
-    fs::write(
-        &file,
-        table("Label;Area;Feret", |_, a| format!("a;{a};1")) + "b;NaN;1\n",
-    )
-    .unwrap();
+    let rows = table("Label;Area;Feret", |_, a| format!("a;{a};1"));
+    fs::write(&file, rows.clone() + "b;x;1\n").unwrap();
     let (code, _, error) = stereology(&["unfold", &file, "--area", "1e6"]);
-    let understood = "line 62: `NaN` in column `Area` is not a finite number (read as: encoding UTF-8, separator semicolon, decimal mark point, columns Label | Area | Feret)";
+    let understood = "line 62: `x` in column `Area` is not a number (read as: encoding UTF-8, separator semicolon, decimal mark point, columns Label | Area | Feret)";
     assert!(code == 1 && error.contains(understood), "{error}");
     let found = answer(&["unfold", &file, "--area", "1e6", "--skip-invalid"]);
+    assert!(
+        codes(&found).contains(&"invalid-rows") && found["profiles"] == 60,
+        "{found}"
+    );
+    // Programs write NaN for what they could not measure.
+    fs::write(&file, rows + "b;NaN;NaN\n").unwrap();
+    let found = answer(&["unfold", &file, "--area", "1e6"]);
     assert!(
         codes(&found).contains(&"invalid-rows") && found["profiles"] == 60,
         "{found}"
@@ -134,7 +138,7 @@ fn invalid_rows_are_refused_or_left_out() {
         "size\n1\n2\n3\n",
         "1\n2\n3\n",
         "id;Diameter\n1;1,0\n2;2,0\n3;3,0\n",
-        "size\n1\n2\nnan\n3\n",
+        "size\n1\n2\nx\n3\n",
     ] {
         fs::write(&file, text).unwrap();
         let found = answer(&[

@@ -490,10 +490,7 @@ mod tests {
             ),
             ("id,Feret\n1,2\n", "accepted names: size, area, equivalent_diameter"),
             ("size\n", "no profiles"),
-            (
-                "size\n1\nnan\n",
-                "line 3: `nan` in column `size` is not a finite number",
-            ),
+            ("size\nnan\n", "line 2: `nan` in column `size` is not a finite number"),
             ("size\n1e400\n", "not a finite number"),
             ("size\n-1\n", "line 2: size -1 is not above zero"),
             ("size\n0\n", "not above zero"),

@@ -1,6 +1,7 @@
 //! `profiles.csv`: a table of profiles with a header. `size` or `area`, or another name of these, is required; `type`,
 //! `category`, `weight`, `slice`, `x` and `y`, `touches_edge` and the bounding box `left,top,right,bottom` are
-//! optional, other columns are ignored. The table may begin with lines `# key=value` ([`table_head`](super::table_head)).
+//! optional, other columns are ignored. The table may begin with lines `# key=value`
+//! ([`table_head`](super::table_head)).
 
 use crate::files::FileError;
 use crate::files::delimited::{Opened, ReadTable};

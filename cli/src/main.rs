@@ -11,6 +11,7 @@ mod manual;
 mod outputs;
 mod particle_files;
 mod particle_surfaces;
+mod pictures;
 mod program;
 mod progress;
 mod signals;
@@ -21,6 +22,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
+use stereology::segment::DECODER_THREAD;
 
 use crate::answer::print;
 use crate::failure::Failure;
@@ -28,6 +30,7 @@ use crate::outputs::Outputs;
 use crate::program::{Command, Program, invocation};
 
 fn main() -> ExitCode {
+    quiet_decoders();
     let matches = match Program::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => return explained(&error),
@@ -80,6 +83,16 @@ fn outputs_of(matches: &ArgMatches, program: &Program) -> Result<Outputs, Failur
         Some(command) => Outputs::of(command, given, program.everywhere.force),
         None => Ok(Outputs::default()),
     }
+}
+
+/// Keeps panics of decoders of images from users: they are reported as errors.
+fn quiet_decoders() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if std::thread::current().name() != Some(DECODER_THREAD) {
+            usual(panic);
+        }
+    }));
 }
 
 fn run(program: &Program) -> Result<ExitCode, Failure> {

@@ -27,6 +27,16 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Use `stereology exemplar`, which copies pixels; for layers or fibres, --mode oriented with one image per axis.",
     ),
     (
+        "binder-colour",
+        "The palette of a label PNG has black at another place than 0; black was taken as the binder.",
+        "Nothing; otherwise save the labels as a grey PNG or TIFF, 0 for the binder.",
+    ),
+    (
+        "binder-numbers",
+        "Pixels of the label map are -1 or not numbers, or it has the background 1 of OpenCV's watershed; they were taken as the binder.",
+        "Nothing; otherwise save the labels with 0 for the binder.",
+    ),
+    (
         "box-rounded",
         "The box's side was rounded to a whole number of periods of the texture, so that the solid repeats.",
         "Nothing, unless you need exactly that side; then give --box as a multiple of the texture's period.",
@@ -37,6 +47,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Save the labels with more bits (u16 or u32) and import them again.",
     ),
     (
+        "clipped-outlines",
+        "Outlines of the label file extend beyond the photograph; they were clipped at its edges.",
+        "Check that the outlines belong to this photograph and that it was not cropped.",
+    ),
+    (
         "clustered",
         "The profiles are clustered: their number varies more than that of independent profiles.",
         "Nothing: the intervals contain it, unless --resample counts was given; several photographs of other places make them narrower.",
@@ -45,6 +60,16 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "coarse-texture",
         "A carved mesh has fewer triangles, or an atlas fewer pixels, than the texture requires: it looks blurred.",
         "Give more --triangles, a larger --atlas, or a larger --period, which makes the texture coarser on the mesh.",
+    ),
+    (
+        "colour-labels",
+        "The label map is an image in colours: each colour was taken as a profile, black, the transparent, or the colour at the edges as the binder.",
+        "Nothing if each profile has a colour of its own; otherwise export numbers.",
+    ),
+    (
+        "colour-profile",
+        "The image has an ICC profile other than sRGB: its colours were converted to sRGB, or could not be.",
+        "Nothing if they were converted; otherwise save the image in sRGB.",
     ),
     (
         "constant-exemplar",
@@ -65,6 +90,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "edge-heavy",
         "Many profiles touch the edge of the photograph.",
         "Take a photograph of a larger area: it should be at least ten times as wide as the largest profile.",
+    ),
+    (
+        "exif-orientation",
+        "The photograph or the label map notes an orientation, and it cannot be seen whether the labels belong to the upright photograph or to the pixels as stored.",
+        "Look at overlay.png; give --exif apply or --exif ignore.",
     ),
     (
         "few-profiles",
@@ -93,7 +123,7 @@ pub const CODES: &[(&str, &str, &str)] = &[
     ),
     (
         "first-page",
-        "The label TIFF has several pages; the first one was taken.",
+        "The TIFF is a stack of images; the first one was taken.",
         "Save only the page that belongs to the photograph.",
     ),
     (
@@ -107,6 +137,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "Look at overlay.png; use a photograph that is sharper or compressed less if they are particles.",
     ),
     (
+        "holes-filled",
+        "Holes in labels of an imported label map were filled.",
+        "Give --holes keep if they are binder.",
+    ),
+    (
         "impossible-area",
         "The profiles cover more than the examined area, beyond the error of counting, or one profile is larger than it.",
         "Check --area and its unit, and whether the sizes are diameters or areas.",
@@ -115,6 +150,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "invalid-rows",
         "Rows of a table with invalid values were left out, as requested.",
         "Look at the first of them: missing values of a few particles bias the sizes if they are not missing at random.",
+    ),
+    (
+        "labels-turned",
+        "The labels belong to the photograph's pixels as stored; they were turned with the photograph.",
+        "Nothing; --exif ignore leaves both as stored.",
     ),
     (
         "largest-uncorrected",
@@ -130,6 +170,16 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "lost-labels",
         "Some outlines of the label file contain no pixel of their own (points, lines, slivers, or covered by others).",
         "Nothing, or correct them in the tool that made them.",
+    ),
+    (
+        "main-page",
+        "The TIFF has thumbnails or levels of a pyramid; the largest page, or that of the photograph's size, was read.",
+        "Nothing, or save only the page that is meant.",
+    ),
+    (
+        "mask-split",
+        "The label map has a single value besides 0, a mask: each connected component was taken as a profile.",
+        "Export a label image if particles touch: they are one profile now.",
     ),
     (
         "measured-as-voxels",
@@ -190,6 +240,11 @@ pub const CODES: &[(&str, &str, &str)] = &[
         "oscillating-bins",
         "Densities of neighbouring bins oscillate: there are too few profiles for that many bins.",
         "Use the number of --bins that the message names, --method auto, or photographs of a larger area.",
+    ),
+    (
+        "other-slices",
+        "The regions of an ImageJ archive belong to several slices; those of the first one were taken.",
+        "Save only the regions that belong to the photograph.",
     ),
     (
         "outlier",

@@ -1,7 +1,8 @@
-//! Random changes of small mesh files, raw meshes and tables, for a number of seconds: `mutate [SECONDS] [SEED]`. A
-//! case that fails is written to `mutate-failure.bin`, and its target is printed.
+//! Random changes of small files of meshes, tables, pictures and label maps, and of raw meshes, for seconds:
+//! `mutate [SECONDS] [SEED] [TARGET]`. A case that fails is written to `mutate-failure.bin`, and its target is printed.
 
 use std::panic::catch_unwind;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rand::{RngExt, SeedableRng};
@@ -12,7 +13,12 @@ fn main() {
     let mut words = std::env::args().skip(1);
     let seconds: u64 = words.next().and_then(|word| word.parse().ok()).unwrap_or(60);
     let seed: u64 = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
-    let seeds = corpus();
+    let only = words.next();
+    let mut seeds = corpus();
+    for target in ["photo", "labels"] {
+        seeds.extend(files(target).into_iter().map(|bytes| (target, bytes)));
+    }
+    seeds.retain(|(target, _)| only.as_ref().is_none_or(|only| only == target));
     let start = Instant::now();
     let (mut cases, mut slowest) = (0_u64, Duration::ZERO);
     while start.elapsed() < Duration::from_secs(seconds) {
@@ -25,6 +31,8 @@ fn main() {
         let outcome = catch_unwind(|| match target {
             "mesh_file" => stereology_fuzz::mesh_file(&bytes),
             "table" => stereology_fuzz::table(&bytes),
+            "photo" => stereology_fuzz::photo(&bytes),
+            "labels" => stereology_fuzz::labels(&bytes),
             _ => stereology_fuzz::sweep(&bytes),
         });
         slowest = slowest.max(begin.elapsed());
@@ -49,6 +57,20 @@ const TABLES: [&[u8]; 5] = [
     b"\"area\" \"y\"\n\"1\" 403.7 2\n\"2\" 1e5 -3\n",
     b"# area=3\nLabel\tarea\tx\n#\t[um^2]\t[-]\na\t1\t2\nb\t-3\t1e400\n",
 ];
+
+/// The files of a target's corpus.
+fn files(target: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let mut paths: Vec<_> = std::fs::read_dir(folder)
+        .expect("the corpus")
+        .map(|entry| entry.expect("a file").path())
+        .collect();
+    paths.sort();
+    paths
+        .into_iter()
+        .map(|path| std::fs::read(path).expect("the file can be read"))
+        .collect()
+}
 
 /// Small meshes in every format, and tables.
 fn corpus() -> Vec<(&'static str, Vec<u8>)> {

@@ -7,6 +7,8 @@ fn main() {
         stereology_fuzz::mesh_file(&bytes);
         stereology_fuzz::sweep(&bytes);
         stereology_fuzz::table(&bytes);
+        stereology_fuzz::photo(&bytes);
+        stereology_fuzz::labels(&bytes);
         println!("{name}: {:?}", start.elapsed());
     }
 }

@@ -2,14 +2,19 @@
 //!
 //! `cargo +nightly fuzz run mesh_file --features libfuzzer` (cargo-fuzz; `-s none` without sanitizers) drives these
 //! functions guided by coverage, from the small corpus in this folder. `cargo run --release --example mutate --
-//! SECONDS` drives them with random changes of small meshes and needs neither nightly nor cargo-fuzz. `cargo run
+//! SECONDS` drives them with random changes of the corpus and of small meshes, and needs neither nightly nor
+//! cargo-fuzz. `cargo run
 //! --release --example replay -- corpus/*/*` runs the corpus, which includes former failures.
 
+use std::io::Write;
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use stereology_kmatrix::{SectionLaw, SectionOptions};
-use stereology_shape::{Body, ClosedMesh, ControlSphere, MeshFormat, TableSource, TriangleMesh, convex_hull, parse_points};
+use stereology_segment::{PhotoOptions, SegmentOptions, Segmentation, read_grey, read_labels_for, read_photo_with};
+use stereology_shape::{
+    Body, ClosedMesh, ControlSphere, MeshFormat, TableSource, TriangleMesh, convex_hull, parse_points,
+};
 
 /// Meshes of more triangles are read and checked, but not swept, to spend the time on small ones.
 const MOST_SWEPT: usize = 400;
@@ -48,6 +53,46 @@ pub fn table(bytes: &[u8]) {
             assert!(number.is_finite());
         }
     }
+}
+
+/// Most pixels of pictures, and the size of label maps, (height, width).
+const MOST_PIXELS: u64 = 1 << 20;
+const MAP: (usize, usize) = (24, 32);
+
+/// Reads the bytes as a picture of any format.
+pub fn photo(bytes: &[u8]) {
+    let options = PhotoOptions {
+        most_pixels: MOST_PIXELS,
+        ..PhotoOptions::default()
+    };
+    let file = file_of(bytes);
+    if let Ok(read) = read_photo_with(file.path(), &options) {
+        assert!(u64::from(read.photo.width()) * u64::from(read.photo.height()) <= MOST_PIXELS);
+    }
+    if let Ok(read) = read_grey(file.path(), &options) {
+        assert!(read.grey.iter().all(|v| (0.0..=1.0).contains(v)));
+    }
+}
+
+/// Reads the bytes as a label map of any format (TIFF, PNG, NumPy, GeoJSON, COCO, LabelMe, VIA, ImageJ's regions), and
+/// measures its profiles.
+pub fn labels(bytes: &[u8]) {
+    let Ok(read) = read_labels_for(file_of(bytes).path(), MAP) else {
+        return;
+    };
+    if read.labels.len() as u64 > MOST_PIXELS {
+        return;
+    }
+    if let Ok(found) = Segmentation::of_sizes(read.labels, &SegmentOptions::default()) {
+        assert!(found.profiles.iter().all(|p| p.area > 0.0 && p.size.is_finite()));
+    }
+}
+
+/// The bytes as a file: formats are recognised by the contents.
+fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
+    let mut file = tempfile::NamedTempFile::new().expect("a file");
+    file.write_all(bytes).expect("the bytes can be written");
+    file
 }
 
 /// Interprets the bytes as a mesh: the number of vertices; coordinates of one byte each (so that many vertices are

@@ -6,13 +6,13 @@
 
 use std::{error::Error, ops::ControlFlow, path::PathBuf};
 
-use stereology_segment::{SegmentOptions, read_photo_up_to, segment, write_labels};
+use stereology_segment::{PhotoOptions, SegmentOptions, read_photo_with, segment, write_labels};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args_os().skip(1);
     let (photo, compression) = match arguments.next() {
         Some(path) => {
-            let read = read_photo_up_to(path, u64::MAX)?;
+            let read = read_photo_with(path, &PhotoOptions::default())?;
             (read.photo, read.compression)
         }
         None => (drawn(), None),

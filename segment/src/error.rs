@@ -15,13 +15,13 @@ pub enum SegmentError {
         source: std::io::Error,
     },
     /// The file holds no bytes.
-    #[error("{}: the file is empty; give a PNG, JPEG or TIFF", path.display())]
+    #[error("{}: the file is empty; give a PNG, JPEG, TIFF, WebP, BMP or GIF", path.display())]
     EmptyFile {
         /// File as given.
         path: PathBuf,
     },
     /// The file is not an image of a known format, or is truncated.
-    #[error("{}: not a readable image ({reason}); give a complete PNG, JPEG or TIFF", path.display())]
+    #[error("{}: not a readable image ({reason}); give a complete PNG, JPEG, TIFF, WebP, BMP or GIF", path.display())]
     Decode {
         /// File as given.
         path: PathBuf,

@@ -63,8 +63,11 @@ mod working_scale;
 
 pub use error::SegmentError;
 pub use files::compression::Compression;
-pub use files::label_map::{LabelFile, read_labels, read_labels_for, write_labels};
-pub use files::photo::{PhotoFile, encoded_image, read_photo, read_photo_up_to};
+pub use files::decoding::DECODER_THREAD;
+pub use files::label_map::{LabelFile, read_label_file, read_labels, read_labels_for, write_labels};
+pub use files::photo::{
+    Exif, GreyFile, PhotoFile, PhotoOptions, encoded_image, read_grey, read_photo, read_photo_with,
+};
 pub use ground::binder::BinderModel;
 pub use ground::faint::faint_regions;
 pub use ground::kmeans::{Clusters, kmeans, silhouette};

@@ -7,7 +7,7 @@ use stereology_imaging::area_average_rgb;
 use stereology_metrics::{Finding, Progress};
 
 use crate::error::SegmentError;
-use crate::files::photo::{MOST_PIXELS, encoded_image, too_large};
+use crate::files::photo::{MOST_PIXELS, SEGMENTING, encoded_image, too_large};
 use crate::found::find;
 use crate::ground::seen::Ground;
 use crate::options::SegmentOptions;
@@ -96,7 +96,7 @@ fn check_photo(photo: &RgbImage) -> Result<(), SegmentError> {
         return Err(SegmentError::TooSmall { width, height });
     }
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(too_large([width, height], MOST_PIXELS));
+        return Err(too_large([width, height], MOST_PIXELS, SEGMENTING));
     }
     let first = *photo.get_pixel(0, 0);
     if photo.pixels().all(|p| *p == first) {

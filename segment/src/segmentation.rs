@@ -38,10 +38,12 @@ pub struct Segmentation {
     pub min_size: f64,
     /// Whether profiles of different categories differ in size; `None` for fewer than two categories.
     pub size_by_category: Option<KruskalWallis>,
-    /// What to know before trusting it. Codes of the photo: `alpha-over-white`, `no-binder`, `vague-binder`,
-    /// `area-fraction`, `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`, `halo`. Of a label map:
-    /// `clipped-labels`, `split-label`, `small-labels`, `first-page`, `overlapping-labels`, `lost-labels`.
+    /// What to know before trusting it. Codes of the photo: `no-binder`, `vague-binder`, `area-fraction`,
+    /// `few-profiles`, `unstable-count`, `edge-heavy`, `near-minimum`, `halo`. Of a label map: `clipped-labels`,
+    /// `split-label`, `mask-split`, `holes-filled`, `small-labels`.
     pub findings: Vec<Finding>,
+    /// Whether there is a photo: without one, colours mean nothing.
+    pub has_colours: bool,
     pub(crate) photo: RgbImage,
     /// Pixels of the mask that belong to no profile: too small, or flecks.
     pub(crate) rejected: Vec<[usize; 2]>,
@@ -76,6 +78,7 @@ impl Segmentation {
             findings: profile_findings(&profiles, area_fraction, frame_limited, options),
             profiles,
             categories,
+            has_colours: true,
             photo: photo.clone(),
             rejected: Vec::new(),
         }

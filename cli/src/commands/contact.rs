@@ -9,13 +9,17 @@ use serde::Serialize;
 use stereology::grid::read_npy;
 use stereology::imaging::otsu;
 use stereology::microgeometry::{self, ContactDistribution, EstimateOptions, Law, contact_of_image, contact_of_volume};
-use stereology::segment::{read_labels, read_photo};
+use stereology::segment::{LabelFile, read_label_file};
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{Output, write_text};
+use crate::pictures::{ImageLimit, warn};
 use crate::values::{bins, not_negative, positive};
+
+/// Memory for each pixel of an image, bytes.
+const BYTES_PER_PIXEL: u64 = 60;
 
 /// Measures the spherical contact distribution of two regions: the distances of their points to the interface between
 /// them
@@ -37,6 +41,8 @@ pub struct Contact {
     /// Image, volume (.npy), label map, or contact distribution (.json)
     #[arg(value_name = "IMAGE", required_unless_present = "positive_law")]
     pub image: Option<PathBuf>,
+    #[command(flatten)]
+    pub limit: ImageLimit,
     /// Grey value, 0 to 255; pixels above it are positive [default: Otsu's threshold]
     #[arg(long, value_name = "T", value_parser = threshold)]
     pub threshold: Option<f64>,
@@ -128,8 +134,9 @@ impl Fields for ContactFields {
 impl Contact {
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         let file = everywhere.outputs.file(&self.output)?;
+        let mut notes = Notes::default();
         let Source { of, threshold, pixels } = match (&self.image, self.negative_law, self.positive_law) {
-            (Some(image), ..) => self.measure(image)?,
+            (Some(image), ..) => self.measure(image, &mut notes)?,
             (None, Some(negative), Some(positive)) => Source {
                 of: ContactDistribution::from_laws(self.pixel_size, negative, positive, self.share)
                     .or_usage("--negative-law, --positive-law")?,
@@ -145,7 +152,6 @@ impl Contact {
             .try_fold(of, |of, &(bin, share)| of.edited(bin, share))
             .or_usage("--edit")?;
         write_text(&file, &of.to_json())?;
-        let mut notes = Notes::default();
         notes.line(format!(
             "positive region {:.1} %, distances up to {:.4}; negative region {:.1} %, up to {:.4} -> {}",
             100.0 * of.positive_share(),
@@ -168,7 +174,7 @@ impl Contact {
         Answer::new(&fields, notes)
     }
 
-    fn measure(&self, image: &Path) -> Result<Source, Failure> {
+    fn measure(&self, image: &Path, notes: &mut Notes) -> Result<Source, Failure> {
         let options = EstimateOptions {
             counting: match self.counting {
                 Counting::Interface => microgeometry::Counting::Interface,
@@ -187,7 +193,10 @@ impl Contact {
             });
         }
         if self.labels {
-            let map = read_labels(image).at(image)?;
+            let LabelFile {
+                labels: map, findings, ..
+            } = read_label_file(image).at(image)?;
+            warn(notes, findings, image);
             let of = contact_of_image(map.mapv(|label| label != 0).view(), &options).at(image)?;
             return Ok(Source {
                 of,
@@ -205,7 +214,7 @@ impl Contact {
                 pixels: Some(grey.len()),
             });
         }
-        let photo = read_photo(image).at(image)?;
+        let photo = self.limit.read(image, BYTES_PER_PIXEL, notes)?;
         let grey = Array2::from_shape_fn((photo.height() as usize, photo.width() as usize), |(y, x)| {
             let [r, g, b] = photo.get_pixel(x as u32, y as u32).0.map(f64::from);
             (0.299 * r + 0.587 * g + 0.114 * b).round() as u8

@@ -13,16 +13,19 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::exemplar::{self, Domain, Exemplar as Picture, Solid, SolidError, SolidOptions, synthesize_solid};
 use stereology::grid::{Element, Format, VolumeShape, VoxelSize, write_volume};
-use stereology::segment::read_photo;
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::Output;
+use crate::pictures::ImageLimit;
 use crate::progress::{Step, go_on};
 use crate::signals::stopped;
 use crate::values::{Extent, bytes, count, positive};
 use stereology_report::significant;
+
+/// Memory for each pixel of an image, bytes.
+const BYTES_PER_PIXEL: u64 = 60;
 
 /// Synthesises a solid whose slices look like an image, for materials without separate particles
 ///
@@ -44,6 +47,8 @@ pub struct Exemplar {
     /// Image of the material; or two or three, one per axis: slices of constant y, x, z
     #[arg(value_name = "IMAGE", required = true, num_args = 1..=3)]
     pub images: Vec<PathBuf>,
+    #[command(flatten)]
+    pub limit: ImageLimit,
     /// Number of voxels: N or NZ,NY,NX
     #[arg(long, value_name = "N[,N,N]")]
     pub size: Extent,
@@ -230,9 +235,9 @@ impl Exemplar {
             _ => return Err(Failure::usage("--size must be N or NZ,NY,NX")),
         };
         let begin = Instant::now();
-        let pictures = self.pictures()?;
-        let options = self.options(everywhere.seed);
         let mut notes = Notes::default();
+        let pictures = self.pictures(&mut notes)?;
+        let options = self.options(everywhere.seed);
         let mut domain = Domain::new(size).or_usage("--size")?;
         // Before the mask, which has a byte for each voxel.
         options
@@ -357,11 +362,11 @@ impl Exemplar {
         options
     }
 
-    fn pictures(&self) -> Result<Pictures, Failure> {
+    fn pictures(&self, notes: &mut Notes) -> Result<Pictures, Failure> {
         let photos: Vec<RgbImage> = self
             .images
             .iter()
-            .map(|path| read_photo(path).at(path))
+            .map(|path| self.limit.read(path, BYTES_PER_PIXEL, notes))
             .collect::<Result<_, _>>()?;
         let grey = photos
             .iter()

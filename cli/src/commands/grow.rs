@@ -17,7 +17,6 @@ use stereology::grid::{Element, Format, SampleType, VolumeShape, VoxelSize, read
 use stereology::grow::{self, GrowOptions, Grown, LevelOptions, Search, Voxels, grow_image, synthesize_by_levels};
 use stereology::metrics::seams;
 use stereology::pipeline::finish_grown;
-use stereology::segment::read_photo;
 use stereology::shape::{Body, ClosedMesh, TriangleMesh, read_mesh};
 
 use self::measurements::Unit;
@@ -25,11 +24,15 @@ use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure, body_of};
 use crate::outputs::{Output, write_png};
+use crate::pictures::ImageLimit;
 use crate::progress::{Step, go_on};
 use crate::signals::stopped;
 use crate::values::{bytes, count, positive};
 use crate::warnings::Warning;
 use stereology_report::{counted, significant};
+
+/// Memory for each pixel of an image, bytes.
+const BYTES_PER_PIXEL: u64 = 60;
 
 /// Fills a mesh with stone that looks like an image and agrees with measurements
 ///
@@ -51,6 +54,8 @@ pub struct Grow {
     pub mesh: OsString,
     /// Image of a section through the stone
     pub image: PathBuf,
+    #[command(flatten)]
+    pub limit: ImageLimit,
     /// Voxels along the mesh's longest side
     #[arg(long, value_name = "N", value_parser = count)]
     pub resolution: Option<usize>,
@@ -214,7 +219,7 @@ impl Grow {
         }
         let begin = Instant::now();
         let mut notes = Notes::default();
-        let image = self.image()?;
+        let image = self.image(&mut notes)?;
         let mesh = closed_mesh(&self.mesh)?;
         for repair in mesh.repairs() {
             notes.warn(Warning::new("mesh-repaired", repair.to_string()));
@@ -391,7 +396,8 @@ impl Grow {
             ));
         }
         let file = everywhere.outputs.file(&self.output)?;
-        let image = self.image()?;
+        let mut notes = Notes::default();
+        let image = self.image(&mut notes)?;
         let channels = image.samples.dim().2;
         if !image.is_bytes || !(channels == 1 || channels == 3) {
             return Err(Failure::run(format!(
@@ -425,7 +431,6 @@ impl Grow {
         go_on()?;
         write_png(&file, &as_picture(&made.view()))?;
         let seconds = begin.elapsed().as_secs_f64();
-        let mut notes = Notes::default();
         notes
             .line(format!("{width} x {height} pixels: {}", self.output.display()))
             .seconds(seconds);
@@ -441,7 +446,22 @@ impl Grow {
         Answer::new(&fields, notes)
     }
 
-    fn image(&self) -> Result<Image, Failure> {
+    /// Bytes of an image; one channel if it is grey.
+    fn of_photo(&self, path: &Path, notes: &mut Notes) -> Result<Image, Failure> {
+        let photo = self.limit.read(path, BYTES_PER_PIXEL, notes)?;
+        let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
+        let shape = (
+            photo.height() as usize,
+            photo.width() as usize,
+            if is_grey { 1 } else { 3 },
+        );
+        Ok(Image {
+            samples: Array3::from_shape_fn(shape, |(y, x, c)| f32::from(photo.get_pixel(x as u32, y as u32)[c])),
+            is_bytes: true,
+        })
+    }
+
+    fn image(&self, notes: &mut Notes) -> Result<Image, Failure> {
         let path = &self.image;
         let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let stored = match ending.as_deref() {
@@ -450,9 +470,9 @@ impl Grow {
             // volumes.
             Some("tif" | "tiff") => match read_volume(path) {
                 Ok(stored) if stored.samples.dim().3 != 4 => stored,
-                _ => return of_photo(path),
+                _ => return self.of_photo(path, notes),
             },
-            _ => return of_photo(path),
+            _ => return self.of_photo(path, notes),
         };
         let (slices, ..) = stored.samples.dim();
         if slices != 1 {
@@ -466,21 +486,6 @@ impl Grow {
             is_bytes: stored.sample_type == SampleType::U8,
         })
     }
-}
-
-/// Bytes of an image; one channel if it is grey.
-fn of_photo(path: &Path) -> Result<Image, Failure> {
-    let photo = read_photo(path).at(path)?;
-    let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
-    let shape = (
-        photo.height() as usize,
-        photo.width() as usize,
-        if is_grey { 1 } else { 3 },
-    );
-    Ok(Image {
-        samples: Array3::from_shape_fn(shape, |(y, x, c)| f32::from(photo.get_pixel(x as u32, y as u32)[c])),
-        is_bytes: true,
-    })
 }
 
 fn as_picture(made: &ArrayView3<'_, f32>) -> image::RgbImage {

@@ -1,16 +1,17 @@
 //! `stereology pyramid`: the sub-bands of an image.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::pyramid::SteerablePyramid;
+use stereology::segment::read_grey;
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
+use crate::pictures::{ImageLimit, warn};
 use crate::values::count;
 
 /// Decomposes an image into the sub-bands of a steerable pyramid and reports their statistics
@@ -21,7 +22,7 @@ use crate::values::count;
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology pyramid granite.png --levels 4 --orientations 4 --json")]
 pub struct Pyramid {
-    /// Image (PNG, JPEG, TIFF)
+    /// Image (PNG, JPEG, TIFF, WebP, BMP, GIF)
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
     /// Number of pyramid levels [default: depends on the size of the image]
@@ -30,6 +31,8 @@ pub struct Pyramid {
     /// Number of orientations of the pyramid
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = count)]
     pub orientations: usize,
+    #[command(flatten)]
+    pub limit: ImageLimit,
 }
 
 /// JSON of `stereology pyramid`.
@@ -72,7 +75,13 @@ impl Fields for PyramidFields {
 
 impl Pyramid {
     pub fn run(&self, _everywhere: &Everywhere) -> Result<Answer, Failure> {
-        let picture = grey(&self.image)?;
+        // The image, its transform, and bands of doubles: at full size one per orientation and two residuals, and a
+        // third more for all coarser levels.
+        let bytes_per_pixel = 80 + 16 * self.orientations as u64;
+        let mut notes = Notes::default();
+        let read = read_grey(&self.image, &self.limit.options(bytes_per_pixel)).at(&self.image)?;
+        warn(&mut notes, read.findings, &self.image);
+        let picture = read.grey;
         let (height, width) = picture.dim();
         let levels = self
             .levels
@@ -86,7 +95,6 @@ impl Pyramid {
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max);
 
-        let mut notes = Notes::default();
         notes.line(format!(
             "{width} x {height} pixels, {levels} levels, {} orientations",
             self.orientations
@@ -123,40 +131,4 @@ impl Pyramid {
         };
         Answer::new(&fields, notes)
     }
-}
-
-/// Stored grey values / 255 (rows, columns); for colours 0.299 R + 0.587 G + 0.114 B.
-fn grey(path: &Path) -> Result<Array2<f64>, Failure> {
-    let picture = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .at(path)?
-        .decode()
-        .map_err(|error| format!("cannot be read as an image ({error}); use PNG, JPEG or TIFF"))
-        .at(path)?;
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let values: Vec<f64> = if picture.color().has_color() {
-        let weighed = |rgb: [f64; 3]| 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
-        match picture.color().bytes_per_pixel() / picture.color().channel_count() {
-            1 => picture
-                .to_rgb8()
-                .pixels()
-                .map(|p| weighed(p.0.map(f64::from)) / 255.0)
-                .collect(),
-            _ => picture
-                .to_rgb16()
-                .pixels()
-                .map(|p| weighed(p.0.map(f64::from)) / 65535.0)
-                .collect(),
-        }
-    } else {
-        match picture.color().bytes_per_pixel() / picture.color().channel_count() {
-            1 => picture.to_luma8().pixels().map(|p| f64::from(p.0[0]) / 255.0).collect(),
-            _ => picture
-                .to_luma16()
-                .pixels()
-                .map(|p| f64::from(p.0[0]) / 65535.0)
-                .collect(),
-        }
-    };
-    Array2::from_shape_vec((height, width), values).at(path)
 }

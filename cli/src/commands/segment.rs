@@ -3,17 +3,21 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use image::RgbImage;
 use schemars::JsonSchema;
 use serde::Serialize;
 use stereology::files::profiles;
 use stereology::files::table_head::TableHead;
 use stereology::grid::LengthUnit;
-use stereology::segment::{self, SegmentOptions, Segmentation, read_labels_for, read_photo_up_to, write_labels};
+use stereology::segment::{
+    self, PhotoOptions, SegmentOptions, Segmentation, read_label_file, read_photo_with, write_labels,
+};
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{Output, OutputFolder, write_json};
+use crate::pictures::Exif;
 use crate::progress::{Step, go_on};
 use crate::values::{BinderArgument, CategoriesArgument, pair, positive};
 use crate::warnings::Warning;
@@ -30,13 +34,14 @@ use stereology_report::{percent, significant};
 /// weight, left, top, right, bottom, pixels, axis_ratio, ellipticity, solidity, orientation; colours 0 to 255,
 /// orientation in degrees from the rows towards larger y; the last four are empty below 50 pixels), overlay.png (look
 /// at this first), binder.png, means.png, residual.tif (f32, photo / 255 - means, exact), residual.png (for viewing)
-/// and summary.json.
+/// and summary.json. Without PHOTO, only labels.tif, profiles.csv (without r, g, b), overlay.png and summary.json.
 #[derive(Args, Debug)]
 #[command(after_long_help = "Example: stereology segment photo.jpg -o out --min-area 30 --categories 3")]
 pub struct Segment {
-    /// Photograph of a plane section (PNG, JPEG, TIFF; 8 or 16 bits, grey or colour, with or without alpha)
-    #[arg(value_name = "PHOTO")]
-    pub photo: PathBuf,
+    /// Photograph of a plane section (PNG, JPEG, TIFF, WebP, BMP, GIF; grey or colour, with or without alpha); may be
+    /// omitted with --labels, for sizes without colours
+    #[arg(value_name = "PHOTO", required_unless_present = "labels")]
+    pub photo: Option<PathBuf>,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR")]
     pub output: Output,
@@ -57,10 +62,13 @@ pub struct Segment {
 #[command(next_help_heading = "Segmentation")]
 #[group(id = "segment-choices")]
 pub struct Choices {
-    /// Import this label map instead of segmenting: TIFF, PNG or .npy with numbers (0 = binder), GeoJSON polygons,
-    /// ImageJ ROI zip, COCO annotations
+    /// Import this label map instead of segmenting: TIFF, PNG or .npy with numbers (0 = binder), an image with one
+    /// colour per profile, a binary mask, polygons of GeoJSON, COCO, LabelMe or VIA, ImageJ ROI zip
     #[arg(long, value_name = "FILE")]
     pub labels: Option<PathBuf>,
+    /// Whether the orientation that a camera noted in the photograph is applied
+    #[arg(long, value_enum, default_value_t = Exif::Auto)]
+    pub exif: Exif,
     /// Colour of the binder, 0 to 255, or the number N, from 0, of one of the photograph's main colours [default: found
     /// in the photograph]
     #[arg(long, value_name = "R,G,B|N")]
@@ -147,6 +155,39 @@ impl Choices {
 }
 
 impl Segment {
+    /// The segmentation, and findings on how its files were read.
+    fn found(&self, seed: u64, step: &Step) -> Result<(Segmentation, Vec<Warning>), Failure> {
+        let options = self.choices.options(seed);
+        let read = PhotoOptions {
+            most_pixels: self.max_pixels,
+            exif: self.choices.exif.choice(),
+            ..PhotoOptions::default()
+        };
+        let photo = self
+            .photo
+            .as_ref()
+            .map(|path| read_photo_with(path, &read).at(path))
+            .transpose()?;
+        match (photo, &self.photo, &self.choices.labels) {
+            (Some(read), Some(path), None) => {
+                let options = options.with_compression(read.compression);
+                let found = segment::segment(&read.photo, &options, &|done| step.at(done)).at(path)?;
+                Ok((found, read.findings))
+            }
+            (Some(read), _, Some(path)) => {
+                let labels = read.labels(path).at(path)?;
+                let found = Segmentation::from_labels(&read.photo, labels.labels, &options).at(path)?;
+                Ok((found, [read.findings, labels.findings].concat()))
+            }
+            (None, _, Some(path)) => {
+                let labels = read_label_file(path).at(path)?;
+                let found = Segmentation::of_sizes(labels.labels, &options).at(path)?;
+                Ok((found, labels.findings))
+            }
+            _ => Err(Failure::usage("give a PHOTO, or --labels FILE")),
+        }
+    }
+
     pub fn run(&self, everywhere: &Everywhere) -> Result<Answer, Failure> {
         everywhere.refuse_unit_of_pixels()?;
         let labels_out: Vec<PathBuf> = self
@@ -155,19 +196,9 @@ impl Segment {
             .map(|output| everywhere.outputs.file(output))
             .collect::<Result<_, _>>()?;
         let folder = everywhere.outputs.folder(&self.output)?;
-        let read = read_photo_up_to(&self.photo, self.max_pixels).at(&self.photo)?;
-        let (photo, mut findings) = (read.photo, read.findings);
-        let options = self.choices.options(everywhere.seed).with_compression(read.compression);
         let step = Step::begin("segmenting", everywhere.quiet);
-        let found = match &self.choices.labels {
-            Some(path) => {
-                let size = (photo.height() as usize, photo.width() as usize);
-                let read = read_labels_for(path, size).at(path)?;
-                findings.extend(read.findings);
-                Segmentation::from_labels(&photo, read.labels, &options).at(path)?
-            }
-            None => segment::segment(&photo, &options, &|done| step.at(done)).at(&self.photo)?,
-        };
+        let (found, mut findings) = self.found(everywhere.seed, &step)?;
+        let options = self.choices.options(everywhere.seed);
         drop(step);
         go_on()?;
         let mut notes = Notes::default();
@@ -227,9 +258,9 @@ pub struct SegmentFields {
     window: WindowFields,
     /// Profiles that the edge rule counts.
     counted: usize,
-    /// Colour of the binder (r, g, b), 0 to 255.
-    binder: [f64; 3],
-    /// Colour categories of the particles.
+    /// Colour of the binder (r, g, b), 0 to 255; null without a photograph.
+    binder: Option<[f64; 3]>,
+    /// Colour categories of the particles; empty without a photograph.
     category_colours: Vec<CategoryFields>,
     /// Test whether sizes differ between categories; null if there is one category.
     size_by_category: Option<TestFields>,
@@ -286,7 +317,8 @@ impl SegmentFields {
                 .collect();
             Some(sizes.iter().sum::<f64>() / sizes.len() as f64).filter(|mean| mean.is_finite())
         };
-        let colours = found.categories.iter().enumerate().map(|(k, category)| CategoryFields {
+        let categories = found.categories.iter().filter(|_| found.has_colours);
+        let colours = categories.enumerate().map(|(k, category)| CategoryFields {
             colour: category.colour.map(|c| 255.0 * c),
             profiles: category.profiles,
             mean_size: mean_size(k),
@@ -305,7 +337,7 @@ impl SegmentFields {
                 counted_area: found.window.area * scale * scale,
             },
             counted: found.profiles.iter().filter(|profile| profile.weight > 0.0).count(),
-            binder: found.binder.colour.map(|c| 255.0 * c),
+            binder: found.has_colours.then(|| found.binder.colour.map(|c| 255.0 * c)),
             category_colours: colours.collect(),
             size_by_category: found.size_by_category.map(|test| TestFields {
                 test: "kruskal-wallis",
@@ -321,15 +353,17 @@ pub fn write_files(folder: &OutputFolder, found: &Segmentation, scale: f64, head
     let labels = folder.file("labels.tif");
     write_labels(&labels, found.labels.view()).at(&labels)?;
     profiles::write(folder.file("profiles.csv"), found, scale, head).or_fail()?;
-    for (name, picture) in [
-        ("overlay.png", found.overlay()),
-        ("binder.png", found.binder_image()),
-        ("means.png", found.means()),
-        ("residual.png", found.residual_image()),
-    ] {
+    let save = |name: &str, picture: RgbImage| {
         let path = folder.file(name);
-        picture.save(&path).at(&path)?;
+        picture.save(&path).at(&path)
+    };
+    save("overlay.png", found.overlay())?;
+    if !found.has_colours {
+        return Ok(());
     }
+    save("binder.png", found.binder_image())?;
+    save("means.png", found.means())?;
+    save("residual.png", found.residual_image())?;
     let residual = folder.file("residual.tif");
     found.write_residual(&residual).at(&residual)
 }

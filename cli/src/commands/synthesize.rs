@@ -19,7 +19,7 @@ use stereology::pyramid::TextureReport;
 use stereology::render::BlockOptions;
 use stereology::renderings::render_solid;
 use stereology::sample;
-use stereology::segment::{PhotoFile, read_labels_for, read_photo_up_to};
+use stereology::segment::{PhotoFile, PhotoOptions, read_photo_with};
 use stereology::shape::TriangleMesh;
 use stereology::volume::{Channel, SlicePlane};
 
@@ -275,15 +275,8 @@ impl Synthesize {
             )));
         }
         let folder = everywhere.outputs.folder(&self.output)?;
-        let (
-            PhotoFile {
-                photo,
-                compression,
-                findings,
-            },
-            name,
-        ) = self.photo()?;
-        options.segment.compression = compression;
+        let (read, name) = self.photo()?;
+        options.segment.compression = read.compression;
         let types = self.types()?;
         let shapes = types.types().len();
         if let Some(none) = self.solid.voids.iter().find(|&&k| k >= shapes) {
@@ -295,9 +288,10 @@ impl Synthesize {
             .segment
             .labels
             .as_ref()
-            .map(|path| read_labels_for(path, (photo.height() as usize, photo.width() as usize)).at(path))
+            .map(|path| read.labels(path).at(path))
             .transpose()?;
         let (labels, mut noticed) = labels.map_or((None, Vec::new()), |read| (Some(read.labels), read.findings));
+        let PhotoFile { photo, findings, .. } = read;
         noticed.extend(findings);
         let finished = match &self.from {
             Some(earlier) => files::steps::read(earlier).at(earlier)?,
@@ -363,7 +357,9 @@ impl Synthesize {
         let Some(path) = &self.photo else {
             let sample = PhotoFile {
                 photo: sample::photo().or_fail()?,
+                name: None,
                 compression: None,
+                turned: None,
                 findings: Vec::new(),
             };
             return Ok((sample, "The built-in sample".to_owned()));
@@ -373,7 +369,11 @@ impl Synthesize {
             .unwrap_or(path.as_os_str())
             .to_string_lossy()
             .into_owned();
-        Ok((read_photo_up_to(path, u64::MAX).at(path)?, name))
+        let options = PhotoOptions {
+            exif: self.segment.exif.choice(),
+            ..PhotoOptions::default()
+        };
+        Ok((read_photo_with(path, &options).at(path)?, name))
     }
 
     fn types(&self) -> Result<ParticleTypes, Failure> {

@@ -16,17 +16,20 @@ use stereology::pyramid::{
     self, Exemplar, TextureOptions, TextureReport, Watch, synthesize_image_with_report, synthesize_oriented_volume,
     synthesize_volume_with_report,
 };
-use stereology::segment::read_photo;
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::commands::measure::ClassifierFields;
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::Output;
+use crate::pictures::ImageLimit;
 use crate::progress::{Step, go_on};
 use crate::signals::stopped;
 use crate::values::{Extent, count};
 use crate::warnings::Warning;
+
+/// Memory for each pixel of the example image, bytes.
+const BYTES_PER_PIXEL: u64 = 150;
 
 /// Synthesises a periodic texture image or volume from an example image
 ///
@@ -46,6 +49,8 @@ pub struct Texture {
     /// Example of the texture; or two or three, one per axis: normal to z, y, x
     #[arg(value_name = "IMAGE", required = true, num_args = 1..=3)]
     pub images: Vec<PathBuf>,
+    #[command(flatten)]
+    pub limit: ImageLimit,
     /// Size of the result in samples: N or NZ,NY,NX (volume), H,W (image)
     #[arg(long, value_name = "N[,N[,N]]")]
     pub size: Extent,
@@ -240,10 +245,11 @@ impl Texture {
             Target::Picture(_) => everywhere.outputs.file(&self.output)?,
             Target::Volume(_, format) => everywhere.outputs.volume(&self.output, format)?,
         };
+        let mut notes = Notes::default();
         let pictures = self
             .images
             .iter()
-            .map(|path| read_photo(path).at(path))
+            .map(|path| self.limit.read(path, BYTES_PER_PIXEL, &mut notes))
             .collect::<Result<Vec<_>, _>>()?;
         let channels = if pictures.iter().all(is_grey) { 1 } else { 3 };
         let samples: Vec<Array3<f32>> = pictures.iter().map(|picture| samples(picture, channels)).collect();
@@ -257,7 +263,7 @@ impl Texture {
             step.at(done)
         };
         let made = self.synthesize((target, &file), &samples, &options, &watch, everywhere)?;
-        let notes = self.notes(&made, mode);
+        self.note(&mut notes, &made, mode);
         let Made { shape, report, limits } = made;
         let fields = TextureFields {
             shape,
@@ -336,8 +342,7 @@ impl Texture {
     }
 
     /// What was made, and how well.
-    fn notes(&self, made: &Made, mode: Mode) -> Notes {
-        let mut notes = Notes::default();
+    fn note(&self, notes: &mut Notes, made: &Made, mode: Mode) {
         notes
             .line(format!(
                 "{} samples written to {}",
@@ -385,7 +390,6 @@ impl Texture {
         if let Some(finding) = &made.limits.finding {
             notes.warn(finding.clone());
         }
-        notes
     }
 
     fn target(&self) -> Result<Target, Failure> {

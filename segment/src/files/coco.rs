@@ -6,57 +6,28 @@ use ndarray::Array2;
 use serde_json::{Value, json};
 
 use crate::conversions::whole_part;
+use crate::files::drawn::Drawing;
 use crate::labels::outline::{Outline, Ring, fill_outlines, outlines};
 
-/// Outlines of the annotations of the image whose size is (height, width): polygons or run-length masks. Numbers are
-/// the annotations' ids if these are distinct, else from 1.
-pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec<Outline>, String> {
-    let images = file["images"].as_array().map_or(&[][..], Vec::as_slice);
-    let fits = |image: &&Value| {
-        let size = (image["height"].as_u64(), image["width"].as_u64());
-        size == (Some(height as u64), Some(width as u64))
-    };
-    let chosen = match images {
-        [] => None,
-        [one] if fits(&one) => one["id"].as_i64(),
-        [one] => {
-            return Err(format!(
-                "its image is {}x{} pixels, the photo {width}x{height}; export the annotations at the photo's size",
-                one["width"], one["height"]
-            ));
-        }
-        several => {
-            let mut fitting = several.iter().filter(fits);
-            match (fitting.next(), fitting.next()) {
-                (Some(one), None) => one["id"].as_i64(),
-                _ => {
-                    return Err(format!(
-                        "it contains annotations of {} images, and not exactly one has the photo's size of {width}x{height}; export those of one image",
-                        several.len()
-                    ));
-                }
-            }
-        }
-    };
-    let annotations = file["annotations"].as_array().map_or(&[][..], Vec::as_slice);
+/// Outlines of the annotations of the image that has the photo's size, (height, width), or of several such the photo's
+/// name: polygons or run-length masks. Numbers are the annotations' ids if these are distinct, else from 1.
+pub(crate) fn parse(file: &Value, size: (usize, usize), name: Option<&str>) -> Result<Drawing, String> {
+    // Networks write the list of annotations alone.
+    let list = file.as_array().or_else(|| file["annotations"].as_array());
+    let annotations = list.map_or(&[][..], Vec::as_slice);
+    if annotations.iter().any(|a| a.get("segments_info").is_some()) {
+        return Err("it is COCO's panoptic format, whose outlines are in a PNG beside it; give that PNG".into());
+    }
+    let chosen = chosen_image(file, size, name)?;
     let ours: Vec<&Value> = annotations
         .iter()
-        .filter(|a| chosen.is_none() || a["image_id"].as_i64() == chosen)
+        .filter(|a| chosen.is_none() || key(&a["image_id"]) == chosen || a.get("image_id").is_none())
         .collect();
-    let mut ids: Vec<u32> = ours
-        .iter()
-        .filter_map(|a| a["id"].as_u64().and_then(|n| u32::try_from(n).ok()))
-        .filter(|n| *n > 0)
-        .collect();
-    let mut sorted = ids.clone();
-    sorted.sort_unstable();
-    sorted.dedup();
-    if sorted.len() != ours.len() {
-        ids = (1..).take(ours.len()).collect();
-    }
     let mut found = Vec::new();
-    for (annotation, id) in ours.into_iter().zip(ids) {
+    let mut left_out = Vec::new();
+    for annotation in ours {
         let at = |what: &str| format!("annotation {}: {what}", annotation["id"]);
+        let id = key(&annotation["id"]).and_then(|id| id.parse::<u32>().ok());
         let segmentation = &annotation["segmentation"];
         let components = if let Some(rings) = segmentation.as_array() {
             rings
@@ -65,14 +36,62 @@ pub(crate) fn parse(file: &Value, (height, width): (usize, usize)) -> Result<Vec
                 .collect::<Option<Vec<_>>>()
                 .ok_or_else(|| at("the polygon is not a list of numbers x, y, x, y, ..."))?
         } else if segmentation.is_object() {
-            runs(segmentation, (height, width))
-                .ok_or_else(|| at("the run-length mask is damaged or not of the photo's size"))?
+            runs(segmentation, size).ok_or_else(|| at("the run-length mask is damaged or not of the photo's size"))?
         } else {
-            return Err(at("no segmentation; boxes are not outlines"));
+            Vec::new()
         };
-        found.push(Outline { id, components });
+        if components.iter().flatten().all(|ring| ring.len() < 3) {
+            left_out.push("without an outline (boxes, points)");
+        } else {
+            found.push((id, components));
+        }
     }
-    Ok(found)
+    Ok(Drawing::numbered(found).with_left_out(&left_out))
+}
+
+/// An id, whether it is a number or text.
+fn key(id: &Value) -> Option<String> {
+    match id {
+        Value::String(text) => Some(text.trim().to_owned()),
+        Value::Number(number) => Some(number.to_string().trim_end_matches(".0").to_owned()),
+        _ => None,
+    }
+}
+
+/// The id of the image that is the photo; `None` if the file lists no images.
+fn chosen_image(file: &Value, (height, width): (usize, usize), name: Option<&str>) -> Result<Option<String>, String> {
+    let Some(images) = file["images"].as_array().filter(|images| !images.is_empty()) else {
+        return Ok(None);
+    };
+    let side = |value: &Value| key(value).and_then(|n| n.parse::<f64>().ok()).filter(|n| *n > 0.0);
+    let has = |image: &Value, key: &str, wanted: usize| {
+        side(&image[key]).is_none_or(|n| n.to_bits() == (wanted as f64).to_bits())
+    };
+    let fitting: Vec<&Value> = images
+        .iter()
+        .filter(|i| has(i, "height", height) && has(i, "width", width))
+        .collect();
+    let is_named = |image: &&&Value| {
+        let file = image["file_name"].as_str().unwrap_or("");
+        name.is_some() && file.rsplit(['/', '\\']).next() == name
+    };
+    let named: Vec<&&Value> = fitting.iter().filter(is_named).collect();
+    match (fitting.as_slice(), named.as_slice()) {
+        ([one], _) => Ok(key(&one["id"])),
+        (_, [one]) => Ok(key(&one["id"])),
+        ([], _) if images.len() == 1 => Err(format!(
+            "its image is {}x{} pixels, the photo {width}x{height}; export the annotations at the photo's size",
+            images[0]["width"], images[0]["height"]
+        )),
+        ([], _) => Err(format!(
+            "it contains annotations of {} images, none of the photo's size of {width}x{height}; export the annotations of the photo",
+            images.len()
+        )),
+        _ => Err(format!(
+            "it contains annotations of {} images of the photo's size of {width}x{height}, and not exactly one with the photo's name; export those of one image",
+            fitting.len()
+        )),
+    }
 }
 
 /// A ring of numbers x, y, x, y, ...

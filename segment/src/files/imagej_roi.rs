@@ -3,66 +3,106 @@
 //! The format is that of ImageJ's class `RoiDecoder`: 64 bytes of header, big endian, then corners as 16-bit numbers
 //! from the box's corner, as floats, or as a path of segments.
 
+use std::collections::BTreeSet;
 use std::io::{self, Cursor, Read, Seek, Write};
 
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use crate::conversions::{index, single, whole_part};
+use crate::files::drawn::{Drawing, ellipse, opened, rectangle};
 use crate::labels::outline::{Outline, Ring};
+use stereology_metrics::Finding;
 
 /// First bytes of a region.
 pub(crate) const MAGIC: &[u8] = b"Iout";
 
 /// Bytes before the corners.
 const HEADER: usize = 64;
-/// Most bytes of one region: some million corners.
+/// Most bytes of all regions of an archive, unpacked: some million corners.
 const LARGEST: u64 = 64 << 20;
-/// Corners that approximate an oval.
-const OVAL: usize = 256;
 /// Bit of the options for corners in floats.
 const SUB_PIXEL: u16 = 128;
 /// Version written: that of ImageJ 1.52.
 const VERSION: u16 = 227;
 const TRACED: u8 = 8;
 const RECTANGLE: u8 = 1;
+const OVAL: u8 = 2;
+
+/// A region: its rings, and the number of its slice, 0 if it belongs to all.
+pub(crate) struct Region {
+    /// Empty for points and lines.
+    components: Vec<Vec<Ring>>,
+    slice: u32,
+}
 
 /// Outlines of the regions of an archive, with the numbers N of names `label-N` if all have one, else numbered from 1;
-/// and how many regions have no area (points and lines), which are left out.
-pub(crate) fn parse_archive(bytes: &[u8]) -> Result<(Vec<Outline>, usize), String> {
+/// points and lines are left out. Of regions of several slices, those of the first one are taken.
+pub(crate) fn parse_archive(bytes: &[u8]) -> Result<Drawing, String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| e.to_string())?;
-    let mut found: Vec<(Option<u32>, Vec<Vec<Ring>>)> = Vec::new();
-    let mut without_area = 0;
+    let mut found: Vec<(Option<u32>, Region)> = Vec::new();
+    let mut left_out = Vec::new();
+    let mut taken = 0;
     for i in 0..archive.len() {
         let entry = archive.by_index(i).map_err(|e| e.to_string())?;
         let name = entry.name().map_err(|e| e.to_string())?.into_owned();
-        if name.ends_with(".npy") {
+        let lower = name.to_ascii_lowercase();
+        if lower.ends_with(".npy") {
             return Err(
                 "it is a NumPy archive of arrays, not an ImageJ archive of regions; save the label array alone as .npy"
                     .into(),
             );
         }
-        if !name.ends_with(".roi") {
+        // macOS adds an entry of its own beside each.
+        let own = lower.rsplit('/').next().is_some_and(|file| file.starts_with("._"));
+        if !lower.ends_with(".roi") || own || lower.starts_with("__macosx/") {
             continue;
         }
-        let mut region = Vec::new();
+        let mut bytes = Vec::new();
         entry
-            .take(LARGEST)
-            .read_to_end(&mut region)
+            .take(LARGEST - taken + 1)
+            .read_to_end(&mut bytes)
             .map_err(|e| format!("{name}: {e}"))?;
-        match parse(&region).map_err(|e| format!("{name}: {e}"))? {
-            Some(components) => found.push((number(&name), components)),
-            None => without_area += 1,
+        taken += bytes.len() as u64;
+        if taken > LARGEST {
+            return Err(format!(
+                "its regions have more than {} megabytes; divide the archive",
+                LARGEST >> 20
+            ));
+        }
+        let region = parse(&bytes).map_err(|e| format!("{name}: {e}"))?;
+        if region.components.is_empty() {
+            left_out.push("points or lines");
+        } else {
+            found.push((number(&lower), region));
         }
     }
-    let mut given: Vec<u32> = found.iter().filter_map(|f| f.0).collect();
-    given.sort_unstable();
-    given.dedup();
-    let keep = given.len() == found.len();
-    let outlines = (1..).zip(found).map(|(n, (id, components))| Outline {
-        id: id.filter(|_| keep).unwrap_or(n),
-        components,
+    let slices: BTreeSet<u32> = found.iter().map(|f| f.1.slice).filter(|s| *s > 0).collect();
+    let finding = (slices.len() > 1).then(|| slices.first()).flatten().map(|first| {
+        let others = found.iter().filter(|f| f.1.slice > 0 && f.1.slice != *first).count();
+        Finding::new(
+            "other-slices",
+            format!(
+                "the regions belong to {} slices; the {others} of slices other than {first} were left out",
+                slices.len()
+            ),
+        )
     });
-    Ok((outlines.collect(), without_area))
+    if let Some(first) = slices.first() {
+        found.retain(|f| f.1.slice == 0 || f.1.slice == *first);
+    }
+    let outlines = found.into_iter().map(|(id, region)| (id, region.components));
+    let mut drawing = Drawing::numbered(outlines.collect()).with_left_out(&left_out);
+    drawing.findings.extend(finding);
+    Ok(drawing)
+}
+
+/// The outline of a file of a single region.
+pub(crate) fn parse_file(bytes: &[u8]) -> Result<Drawing, String> {
+    let components = parse(bytes)?.components;
+    if components.is_empty() {
+        return Ok(Drawing::default().with_left_out(&["points or lines"]));
+    }
+    Ok(Drawing::numbered(vec![(None, components)]))
 }
 
 /// N of `label-N.roi`.
@@ -75,8 +115,7 @@ fn number(name: &str) -> Option<u32> {
         .filter(|n| *n > 0)
 }
 
-/// Rings of a region; `None` for points and lines.
-pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
+fn parse(region: &[u8]) -> Result<Region, String> {
     if !region.starts_with(MAGIC) || region.len() < HEADER {
         return Err("is not an ImageJ region".into());
     }
@@ -97,38 +136,46 @@ pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
     };
     let (top, left, bottom, right) = (signed(8)?, signed(10)?, signed(12)?, signed(14)?);
     let path = long(36)? as usize;
+    // ImageJ's position counts slices; hyperstacks have channel, slice and frame in a second header.
+    let second = long(60)? as usize;
+    let of_stack = |k: usize| {
+        if second > 0 {
+            long(second.saturating_add(4 + 4 * k)).unwrap_or(0)
+        } else {
+            0
+        }
+    };
+    let [z, t] = [of_stack(1), of_stack(2)];
+    let slice = match (z, t) {
+        (0, 0) => long(56)?,
+        // Distinct for frames of up to 65,536 slices.
+        (z, t) => t.saturating_mul(1 << 16).saturating_add(z),
+    };
+    let of = |components| Region { components, slice };
     if path > 0 {
-        return segments(path, &float).map(Some);
+        return segments(path, &float).map(of);
     }
+    let sub_pixel = short(50)? & SUB_PIXEL != 0 && short(4)? >= 222;
+    let bounds = match region[6] {
+        RECTANGLE if sub_pixel => [float(18)?, float(22)?, float(26)?, float(30)?],
+        // ImageJ rounds the corner down to a whole pixel.
+        OVAL if sub_pixel => [float(18)?.floor(), float(22)?.floor(), float(26)?, float(30)?],
+        _ => [left, top, right - left, bottom - top],
+    };
+    let [x, y, w, h] = bounds;
     let ring: Ring = match region[6] {
-        1 if short(50)? & SUB_PIXEL != 0 => {
-            let (x, y, w, h) = (float(18)?, float(22)?, float(26)?, float(30)?);
-            vec![[x, y], [x + w, y], [x + w, y + h], [x, y + h]]
-        }
-        1 => vec![[left, top], [right, top], [right, bottom], [left, bottom]],
-        2 => {
-            let (x, y, a, b) = (
-                0.5 * (left + right),
-                0.5 * (top + bottom),
-                0.5 * (right - left),
-                0.5 * (bottom - top),
-            );
-            let angle = |k: usize| std::f64::consts::TAU * k as f64 / OVAL as f64;
-            (0..OVAL)
-                .map(|k| [x + a * angle(k).cos(), y + b * angle(k).sin()])
-                .collect()
-        }
+        RECTANGLE => rectangle([x, y], [w, h]),
+        OVAL => ellipse([x + 0.5 * w, y + 0.5 * h], [0.5 * w, 0.5 * h], 0.0),
         0 | 7 | 8 => {
             let n = match short(16)? {
                 0 => long(18)? as usize, // more than 65,535 corners
                 n => usize::from(n),
             };
-            let floats = short(50)? & SUB_PIXEL != 0 && short(4)? >= 222;
-            if region.len() < HEADER + n * if floats { 12 } else { 4 } {
+            if region.len() < n.saturating_mul(if sub_pixel { 12 } else { 4 }).saturating_add(HEADER) {
                 return Err(cut());
             }
             let corner = |i: usize| -> Result<[f64; 2], String> {
-                if floats {
+                if sub_pixel {
                     let start = HEADER + 4 * n;
                     Ok([float(start + 4 * i)?, float(start + 4 * (n + i))?])
                 } else {
@@ -137,9 +184,9 @@ pub(crate) fn parse(region: &[u8]) -> Result<Option<Vec<Vec<Ring>>>, String> {
             };
             (0..n).map(corner).collect::<Result<_, _>>()?
         }
-        _ => return Ok(None),
+        _ => return Ok(of(Vec::new())),
     };
-    Ok(Some(vec![vec![ring]]))
+    Ok(of(vec![vec![ring]]))
 }
 
 /// Rings of a path of moves, lines and curves; all belong to one component, filled by the even-odd rule.
@@ -168,12 +215,7 @@ fn segments(count: usize, float: &impl Fn(usize) -> Result<f64, String>) -> Resu
         }
         i += 1 + 2 * points;
     }
-    for ring in &mut rings {
-        if ring.len() > 1 && ring.first() == ring.last() {
-            ring.pop();
-        }
-    }
-    Ok(vec![rings])
+    Ok(vec![rings.into_iter().map(opened).collect()])
 }
 
 /// Appends a Bézier curve from the ring's last corner by de Casteljau's construction, in eight steps.
@@ -273,8 +315,8 @@ mod tests {
     #[test]
     fn kinds() {
         let area = |region: &[u8]| {
-            let components = parse(region).unwrap()?;
-            Some(Outline { id: 1, components }.area())
+            let components = parse(region).unwrap().components;
+            (!components.is_empty()).then(|| Outline { id: 1, components }.area())
         };
         assert_eq!(area(&header(1, [2, 3, 7, 13], 0)), Some(50.0));
         let oval = area(&header(2, [0, 0, 20, 10], 0)).unwrap();

@@ -1,21 +1,25 @@
 //! Label maps in files: one number per profile, 0 for the binder; or outlines of the profiles.
 
 use std::{
-    io::{self, BufReader, Cursor},
+    io::{self, Cursor},
     path::Path,
 };
 
+use image::ImageFormat;
+use image::metadata::Orientation;
 use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
 use stereology_grid::write_atomically;
 
 use crate::error::SegmentError;
-use crate::files::coco;
-use crate::files::geojson;
-use crate::files::imagej_roi;
-use crate::files::label_raster::{dimensions, ending, narrow, parse_npy, parse_png, parse_tiff, write_npy, write_tiff};
+use crate::files::drawn::Drawing;
+use crate::files::label_raster::{
+    dimensions, ending, narrow, parse_image, parse_npy, parse_tiff, write_npy, write_tiff,
+};
 use crate::files::photo::read_bytes;
-use crate::labels::outline::{Outline, fill_outlines, outlines};
+use crate::files::tiff::is_tiff;
+use crate::files::{coco, geojson, imagej_roi, labelme, via};
+use crate::labels::outline::outlines;
 use stereology_metrics::Finding;
 
 /// A label map from a file, and findings on how it was read.
@@ -23,8 +27,11 @@ use stereology_metrics::Finding;
 pub struct LabelFile {
     /// Axes (y, x); 0 is the binder.
     pub labels: Array2<u32>,
-    /// `first-page`, `overlapping-labels`, `lost-labels`.
+    /// Of arrays: `first-page`, `main-page`, `binder-numbers`, `binder-colour`, `colour-labels`, `labels-turned`,
+    /// `exif-orientation`. Of outlines: `overlapping-labels`, `lost-labels`, `clipped-outlines`, `other-slices`.
     pub findings: Vec<Finding>,
+    /// How the file says that its array is turned to be upright; not applied.
+    pub(crate) orientation: Orientation,
 }
 
 /// Reads a label map for a photo of `size` pixels, (height, width), whatever tool made it; the format is recognised by
@@ -32,17 +39,19 @@ pub struct LabelFile {
 ///
 /// | file | from | |
 /// |---|---|---|
-/// | TIFF, 1 to 64 bits | ImageGrains, StarDist, Cellpose, ImageJ, napari | stored numbers, never inverted for display; floats if whole; first page |
+/// | TIFF, 1 to 64 bits | ImageGrains, StarDist, Cellpose, ImageJ, napari, OpenCV | stored numbers, never inverted for display; floats if whole; NaN, and watershed's -1 and 1, are the binder; the page of the photo's size |
 /// | PNG, 1 to 16 bits, grey or palette | Cellpose, VOC | stored numbers or palette indices |
+/// | TIFF, PNG, BMP, GIF, WebP in colours | COCO panoptic, Segment Anything | one colour is one label; black and the transparent are the binder |
 /// | .npy | NumPy, Cellpose | whole numbers of any kind, two axes |
-/// | GeoJSON polygons | segmenteverygrain, QGIS | x column, y row, pixel centres at whole numbers; where all y ≤ 0, QGIS's: y up, pixel corners at whole numbers |
-/// | ImageJ regions, .zip or .roi | Fiji's ROI manager, StarDist | polygons, rectangles, ovals, paths; points and lines are left out |
-/// | COCO annotations | labelling tools, networks | polygons and run-length masks of the one image of the photo's size |
+/// | GeoJSON polygons: collections, lists, one feature per line | segmenteverygrain, QGIS, QuPath | x column, y row, pixel centres at whole numbers; where all y ≤ 0, QGIS's: y up, pixel corners at whole numbers, as QuPath's |
+/// | ImageJ regions, .zip or .roi | Fiji's ROI manager, StarDist | polygons, rectangles, ovals, paths; of one slice; points and lines are left out |
+/// | COCO annotations | labelling tools, networks | polygons and run-length masks of the image of the photo's size |
+/// | LabelMe, VIA | the tools of these names | polygons, rectangles, circles, ellipses, masks |
 ///
 /// # Errors
 ///
-/// The file cannot be opened or is damaged; its numbers are not labels; it contains pickled objects; outlines extend
-/// beyond the photo. Label arrays of another size are refused by [`crate::Segmentation::from_labels`].
+/// The file cannot be opened or is damaged; its numbers are not labels; it contains pickled objects; many outlines lie
+/// outside the photo; an image is neither of the photo's size nor turned by a quarter.
 ///
 /// # Examples
 ///
@@ -60,7 +69,26 @@ pub struct LabelFile {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_labels_for(path: impl AsRef<Path>, size: (usize, usize)) -> Result<LabelFile, SegmentError> {
-    read(path.as_ref(), Some(size))
+    read(path.as_ref(), Some(size), None)
+}
+
+/// Reads a label map whose file states its size, with findings on how it was read; otherwise as [`read_labels`].
+///
+/// # Errors
+///
+/// As [`read_labels`].
+///
+/// # Examples
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("labels.png");
+/// image::RgbImage::from_fn(4, 3, |x, _| image::Rgb([0, 90, 7].map(|v| if x > 1 { v } else { 0 }))).save(&file)?;
+/// assert_eq!(stereology_segment::read_label_file(&file)?.findings[0].code, "colour-labels");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn read_label_file(path: impl AsRef<Path>) -> Result<LabelFile, SegmentError> {
+    read(path.as_ref(), None, None)
 }
 
 /// Reads a label map whose file states its size, axes (y, x), 0 the binder: TIFF, PNG or .npy. See [`read_labels_for`],
@@ -84,91 +112,97 @@ pub fn read_labels_for(path: impl AsRef<Path>, size: (usize, usize)) -> Result<L
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_labels(path: impl AsRef<Path>) -> Result<Array2<u32>, SegmentError> {
-    Ok(read(path.as_ref(), None)?.labels)
+    Ok(read(path.as_ref(), None, None)?.labels)
 }
 
-fn read(path: &Path, size: Option<(usize, usize)>) -> Result<LabelFile, SegmentError> {
+/// Reads a label file for a photo of a size, (height, width), and a file name, as far as they are known.
+pub(crate) fn read(path: &Path, size: Option<(usize, usize)>, name: Option<&str>) -> Result<LabelFile, SegmentError> {
     let bytes = read_bytes(path)?;
-    let refuse = |reason: String| SegmentError::LabelFormat {
+    parse(&bytes, size, name).map_err(|reason| SegmentError::LabelFormat {
         path: path.into(),
         reason,
-    };
-    let plain = |labels| LabelFile {
-        labels,
-        findings: Vec::new(),
-    };
-    let starts = |start: &[u8]| bytes.starts_with(start);
-    if [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
-        .iter()
-        .any(|magic| starts(*magic))
-    {
-        let (labels, findings) = parse_tiff(&bytes).map_err(refuse)?;
-        return Ok(LabelFile { labels, findings });
-    }
-    if starts(b"\x89PNG") {
-        return Ok(plain(parse_png(&bytes).map_err(refuse)?));
-    }
-    if starts(b"\x93NUMPY") {
-        return Ok(plain(parse_npy(&bytes).map_err(refuse)?));
-    }
-    if starts(b"\x80") {
-        return Err(refuse("it is a pickled Python object, which may run code when read; save the label array itself as TIFF, PNG or .npy".into()));
-    }
-    let zipped = starts(b"PK");
-    let text = bytes
-        .iter()
-        .find(|b| !b.is_ascii_whitespace() && !b"\xef\xbb\xbf".contains(b));
-    if !zipped && !starts(imagej_roi::MAGIC) && text != Some(&b'{') {
-        return Err(refuse("its first bytes are of no known kind of label file; give a TIFF, a PNG, a .npy array, GeoJSON or COCO polygons, or an ImageJ ROI zip".into()));
-    }
-    let size = size
-        .ok_or_else(|| refuse("a file of outlines does not state the photo's size; give the photo as well".into()))?;
-    let mut without_area = 0;
-    let found = if zipped {
-        let (found, lines) = imagej_roi::parse_archive(&bytes).map_err(refuse)?;
-        without_area = lines;
-        found
-    } else if starts(imagej_roi::MAGIC) {
-        let components = imagej_roi::parse(&bytes).map_err(refuse)?;
-        let outline = components.map(|components| Outline { id: 1, components });
-        outline.into_iter().collect()
-    } else {
-        let start = bytes.iter().position(|b| *b == b'{').unwrap_or(0);
-        let json: Value = serde_json::from_reader(BufReader::new(&bytes[start..]))
-            .map_err(|e| refuse(format!("is not JSON ({e})")))?;
-        if json.get("annotations").is_some() {
-            coco::parse(&json, size).map_err(refuse)?
-        } else {
-            geojson::parse(&json).map_err(refuse)?
-        }
-    };
-    drawn(&found, without_area, size).map_err(refuse)
+    })
 }
 
-/// Label map of outlines, with findings on overlaps and losses.
-fn drawn(found: &[Outline], without_area: usize, (height, width): (usize, usize)) -> Result<LabelFile, String> {
-    let corners = || found.iter().flat_map(|o| o.components.iter().flatten().flatten());
-    let beyond = corners()
-        .find(|c| !(c[0] >= -2.0 && c[1] >= -2.0 && c[0] <= width as f64 + 2.0 && c[1] <= height as f64 + 2.0));
-    if let Some([x, y]) = beyond {
-        return Err(format!(
-            "an outline extends to x = {x}, y = {y}, but the photo is {width}x{height} pixels; export outlines in pixels of this photo, not rotated, cropped or in map units"
-        ));
+/// The labels that the bytes of a file stand for.
+pub(crate) fn parse(bytes: &[u8], size: Option<(usize, usize)>, name: Option<&str>) -> Result<LabelFile, String> {
+    let starts = |start: &[u8]| bytes.starts_with(start);
+    let raster = if is_tiff(bytes) {
+        Some(parse_tiff(bytes, size)?)
+    } else if starts(b"\x93NUMPY") {
+        Some(parse_npy(bytes)?)
+    } else {
+        match image::guess_format(bytes) {
+            Ok(ImageFormat::Jpeg) => {
+                return Err("it is a JPEG, which changes numbers and colours when it is saved; export the labels as PNG, TIFF or .npy".into());
+            }
+            Ok(ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Gif | ImageFormat::WebP) => {
+                Some(parse_image(bytes, size)?)
+            }
+            _ => None,
+        }
+    };
+    if let Some(raster) = raster {
+        return Ok(LabelFile {
+            labels: raster.labels,
+            findings: raster.findings,
+            orientation: raster.orientation,
+        });
     }
-    let (labels, overlap) = fill_outlines(found, (height, width));
-    let mut findings = Vec::new();
-    if overlap > 0 {
-        findings.push(Finding::new(
-            "overlapping-labels",
-            format!("{overlap} pixels lie in more than one outline; they were assigned to the smaller one"),
-        ));
+    if starts(b"\x80") {
+        return Err("it is a pickled Python object, which may run code when read; save the label array itself as TIFF, PNG or .npy".into());
     }
-    let drawn = crate::labels::profile::distinct(&labels).len();
-    let lost = found.len() - drawn + without_area;
-    if lost > 0 {
-        findings.push(Finding::new("lost-labels", format!("{lost} of {} outlines contain no pixel centre of their own (points, lines, slivers, or covered by others) and are left out", found.len() + without_area)));
+    let drawing = |size: Option<(usize, usize)>| -> Result<(Drawing, (usize, usize)), String> {
+        let size = size.ok_or("a file of outlines does not state the photo's size; give the photo as well")?;
+        if starts(b"PK") {
+            return Ok((imagej_roi::parse_archive(bytes)?, size));
+        }
+        if starts(imagej_roi::MAGIC) {
+            return Ok((imagej_roi::parse_file(bytes)?, size));
+        }
+        Ok((parse_json(bytes, size, name)?, size))
+    };
+    let first = bytes
+        .iter()
+        .find(|b| !b.is_ascii_whitespace() && !b"\xef\xbb\xbf".contains(b));
+    if !starts(b"PK") && !starts(imagej_roi::MAGIC) && !matches!(first, Some(b'{' | b'[' | 0x1e)) {
+        return Err("its first bytes are of no known kind of label file; give a TIFF, a PNG, a .npy array, polygons of GeoJSON, COCO, LabelMe or VIA, or an ImageJ ROI zip".into());
     }
-    Ok(LabelFile { labels, findings })
+    let (drawing, size) = drawing(size)?;
+    let (labels, findings) = drawing.filled(size)?;
+    Ok(LabelFile {
+        labels,
+        findings,
+        orientation: Orientation::NoTransforms,
+    })
+}
+
+/// Outlines of JSON: COCO, LabelMe, VIA, or GeoJSON, which may have one feature per line.
+fn parse_json(bytes: &[u8], size: (usize, usize), name: Option<&str>) -> Result<Drawing, String> {
+    // A mark of the byte order, and the separators of GeoJSON's sequences, are no JSON.
+    let start = bytes.iter().position(|b| matches!(b, b'{' | b'[')).unwrap_or(0);
+    let mut text = bytes[start..].to_vec();
+    text.iter_mut().filter(|b| **b == 0x1e).for_each(|b| *b = b' ');
+    let values = serde_json::Deserializer::from_slice(&text).into_iter();
+    let values: Vec<Value> = values
+        .collect::<Result<_, _>>()
+        .map_err(|e| format!("is not JSON ({e})"))?;
+    let Some(json) = values.first() else {
+        return Err("is not JSON".into());
+    };
+    let results = json
+        .as_array()
+        .is_some_and(|list| list.iter().any(|a| a.get("segmentation").is_some()));
+    if json.get("annotations").is_some_and(Value::is_array) || results {
+        return coco::parse(json, size, name);
+    }
+    if json.get("shapes").is_some() {
+        return labelme::parse(json, size);
+    }
+    match via::pictures(json) {
+        Some(pictures) => via::parse(&pictures, name),
+        None => geojson::parse(&values),
+    }
 }
 
 /// Writes a label map in the format of the file name's extension: .tif or .tiff (u16 where the largest label fits, else

@@ -1,95 +1,175 @@
-//! Label maps as arrays of numbers: TIFF, PNG, NumPy.
+//! Label maps as arrays of numbers or colours: TIFF, PNG and other images, NumPy.
 
 use std::{
     io::{Cursor, Seek, Write},
     path::Path,
 };
 
+use image::metadata::Orientation;
+use image::{ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, ArrayView2};
-use tiff::{
-    ColorType,
-    decoder::{Decoder, DecodingResult, Limits},
-    encoder::{TiffEncoder, colortype},
-    tags::Tag,
-};
+use tiff::encoder::{TiffEncoder, colortype};
 
 use stereology_metrics::Finding;
 
-use crate::conversions::{index, whole_part};
+use crate::conversions::index;
+use crate::files::colour_labels::{ADVICE, colour_labels, number_labels, shaped};
+use crate::files::decoding::{check_png, guarded};
+use crate::files::tiff::{Photometric, Samples, float, main_page};
 
-/// Bytes of the samples of a label map: 20,000 x 20,000 of 32 bits.
-const LARGEST_MAP: usize = 1_600_000_000;
-/// Advice for files whose samples are not labels.
-const ADVICE: &str = "give one channel of whole numbers, 0 for the binder";
+/// Pixels of a label map: 20,000 x 20,000.
+const MOST_PIXELS: u64 = 400_000_000;
 
-/// Labels of a TIFF as stored: numbers of 1 to 64 bits, floats if whole, never inverted for display.
-pub(crate) fn parse_tiff(bytes: &[u8]) -> Result<(Array2<u32>, Vec<Finding>), String> {
-    // A header may state any size; larger maps are not supported.
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = LARGEST_MAP;
-    let text = |e: tiff::TiffError| e.to_string();
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(text)?.with_limits(limits);
-    let (width, height) = decoder.dimensions().map_err(text)?;
-    let colour = decoder.colortype().map_err(text)?;
-    let inverted = decoder
-        .find_tag(Tag::PhotometricInterpretation)
-        .ok()
-        .flatten()
-        .and_then(|v| v.into_u16().ok())
-        == Some(0);
-    let bits = match colour {
-        ColorType::Gray(bits) | ColorType::Palette(bits) => bits,
-        other => return Err(format!("the pixels are {other:?}; {ADVICE}")),
-    };
-    let (rows, columns) = (height as usize, width as usize);
-    let flip = |v: u64, bits: u8| if inverted { !v & (u64::MAX >> (64 - bits)) } else { v };
-    let samples: Result<Vec<u32>, String> = match decoder.read_image().map_err(text)? {
-        DecodingResult::U8(v) if bits < 8 => {
-            let unpacked = unpack(&v, columns, bits);
-            unpacked.map(|l| whole(flip(u64::from(l), bits) as f64)).collect()
+/// A label map as an image or array.
+pub(crate) struct LabelRaster {
+    pub(crate) labels: Array2<u32>,
+    pub(crate) findings: Vec<Finding>,
+    /// How the file says that it is turned to be upright; not applied.
+    pub(crate) orientation: Orientation,
+}
+
+impl LabelRaster {
+    pub(crate) fn of((labels, findings): (Array2<u32>, Vec<Finding>)) -> Self {
+        Self {
+            labels,
+            findings,
+            orientation: Orientation::NoTransforms,
         }
-        DecodingResult::U8(v) => v.into_iter().map(|l| whole(flip(u64::from(l), 8) as f64)).collect(),
-        DecodingResult::U16(v) => v.into_iter().map(|l| whole(flip(u64::from(l), 16) as f64)).collect(),
-        DecodingResult::U32(v) => v.into_iter().map(|l| whole(flip(u64::from(l), 32) as f64)).collect(),
-        DecodingResult::U64(v) => v.into_iter().map(|l| whole(flip(l, 64) as f64)).collect(),
-        DecodingResult::I8(v) => v.into_iter().map(|l| whole(f64::from(l))).collect(),
-        DecodingResult::I16(v) => v.into_iter().map(|l| whole(f64::from(l))).collect(),
-        DecodingResult::I32(v) => v.into_iter().map(|l| whole(f64::from(l))).collect(),
-        DecodingResult::I64(v) => v.into_iter().map(|l| whole(l as f64)).collect(),
-        DecodingResult::F32(v) => v.into_iter().map(|l| whole(f64::from(l))).collect(),
-        DecodingResult::F64(v) => v.into_iter().map(whole).collect(),
-        _ => Err(format!("the samples are of an unsupported type; {ADVICE}")),
-    };
-    let mut pages = 1;
-    while decoder.more_images() && decoder.next_image().is_ok() {
-        pages += 1;
     }
-    let findings = (pages > 1).then(|| {
-        Finding::new(
-            "first-page",
-            format!("the TIFF has {pages} pages; the first one was read: save only the page that belongs to the photo"),
-        )
-    });
-    Ok((shaped((rows, columns), samples?)?, findings.into_iter().collect()))
+}
+
+/// Refuses a map that is neither of the photo's size, (height, width), nor of it turned by a quarter; and one that is
+/// too large, where the photo's size is not known.
+fn check_size([width, height]: [u64; 2], size: Option<(usize, usize)>) -> Result<(), String> {
+    match size {
+        Some((rows, columns)) => {
+            let [rows, columns] = [rows as u64, columns as u64];
+            if [width, height] != [columns, rows] && [width, height] != [rows, columns] {
+                return Err(format!(
+                    "the label map is {width}x{height} pixels, the photo {columns}x{rows}; export the labels at the photo's size, not rotated or cropped"
+                ));
+            }
+        }
+        None if width.saturating_mul(height) > MOST_PIXELS => {
+            return Err(format!(
+                "the label map is {width}x{height} pixels; at most {MOST_PIXELS} pixels are read"
+            ));
+        }
+        None => {}
+    }
+    Ok(())
+}
+
+/// Labels of a TIFF as stored: numbers of any kind, never inverted for display, places of a palette; or colours.
+pub(crate) fn parse_tiff(bytes: &[u8], size: Option<(usize, usize)>) -> Result<LabelRaster, String> {
+    let (page, mut findings) = main_page(bytes, size)?;
+    check_size([page.width as u64, page.height as u64], size)?;
+    let samples = guarded(|| page.read())?;
+    let shape = (page.height, page.width);
+    let opacity = page.extra.first().is_some_and(|kind| matches!(kind, 1 | 2));
+    let (labels, more) = match (page.colours(), page.samples, samples) {
+        (1, 1, Samples::Bytes(v)) => (shaped(shape, v.into_iter().map(u32::from).collect())?, Vec::new()),
+        (1, 1, Samples::Shorts(v)) => (shaped(shape, v.into_iter().map(u32::from).collect())?, Vec::new()),
+        (1, 1, Samples::Whole(v)) => number_labels(shape, v.into_iter().map(|v| v as f64))?,
+        (1, 1, Samples::Real(v)) => number_labels(shape, v.into_iter())?,
+        (1, 2, samples) if opacity => number_labels(shape, seen(samples))?,
+        (1, n, _) => {
+            return Err(format!(
+                "the TIFF has {n} channels or planes, of which one may hold the labels; save that one alone"
+            ));
+        }
+        (3, n, samples) if matches!(page.photometric, Photometric::Rgb) => {
+            let stored = wide(samples).ok_or_else(|| format!("the colours are no whole numbers; {ADVICE}"))?;
+            let colours = stored
+                .chunks_exact(n)
+                .map(|p| [p[0], p[1], p[2], if n > 3 && opacity { p[3] } else { u16::MAX }]);
+            colour_labels(shape, &colours.collect::<Vec<_>>())?
+        }
+        _ => return Err(format!("the pixels are {:?}; {ADVICE}", page.photometric)),
+    };
+    findings.extend(more);
+    Ok(LabelRaster {
+        labels,
+        findings,
+        orientation: Orientation::from_exif(page.orientation).unwrap_or(Orientation::NoTransforms),
+    })
+}
+
+/// Numbers with an opacity behind each; 0 where nothing is to be seen.
+fn seen(samples: Samples) -> Box<dyn Iterator<Item = f64>> {
+    let values: Vec<f64> = match samples {
+        Samples::Bytes(v) => v.into_iter().map(f64::from).collect(),
+        Samples::Shorts(v) => v.into_iter().map(f64::from).collect(),
+        Samples::Whole(v) => v.into_iter().map(|v| v as f64).collect(),
+        Samples::Real(v) => v,
+    };
+    let mut values = values.into_iter();
+    Box::new(std::iter::from_fn(move || {
+        let (value, opacity) = (values.next()?, values.next()?);
+        Some(if opacity > 0.0 { value } else { 0.0 })
+    }))
+}
+
+/// Whole numbers as 16 bits.
+fn wide(samples: Samples) -> Option<Vec<u16>> {
+    match samples {
+        Samples::Bytes(v) => Some(v.into_iter().map(u16::from).collect()),
+        Samples::Shorts(v) => Some(v),
+        Samples::Whole(_) | Samples::Real(_) => None,
+    }
+}
+
+/// Labels of a PNG, BMP, GIF or WebP: grey numbers of 1 to 16 bits, places of a PNG's palette, or colours.
+pub(crate) fn parse_image(bytes: &[u8], size: Option<(usize, usize)>) -> Result<LabelRaster, String> {
+    let text = |e: image::ImageError| e.to_string();
+    let format = image::guess_format(bytes).map_err(text)?;
+    if format == ImageFormat::Png {
+        check_png(bytes)?;
+        if matches!(bytes.get(25), Some(0 | 3)) {
+            return guarded(|| parse_png(bytes, size));
+        }
+    }
+    let reader = || {
+        let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+        reader.limits(Limits::no_limits());
+        reader
+    };
+    let (width, height) = guarded(|| reader().into_dimensions().map_err(text))?;
+    check_size([u64::from(width), u64::from(height)], size)?;
+    let image = guarded(|| reader().decode().map_err(text))?;
+    let short = image.color().bytes_per_pixel() / image.color().channel_count() > 1;
+    let opacity = image.color().has_alpha();
+    let colours: Vec<[u16; 4]> = if short {
+        image.into_rgba16().pixels().map(|p| p.0).collect()
+    } else {
+        image.into_rgba8().pixels().map(|p| p.0.map(u16::from)).collect()
+    };
+    let colours: Vec<[u16; 4]> = if opacity {
+        colours
+    } else {
+        colours.into_iter().map(|[r, g, b, _]| [r, g, b, u16::MAX]).collect()
+    };
+    Ok(LabelRaster::of(colour_labels(
+        (height as usize, width as usize),
+        &colours,
+    )?))
 }
 
 /// Labels of a PNG of one channel, 1 to 16 bits; the indices of one with a palette.
-pub(crate) fn parse_png(bytes: &[u8]) -> Result<Array2<u32>, String> {
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: LARGEST_MAP });
+fn parse_png(bytes: &[u8], size: Option<(usize, usize)>) -> Result<LabelRaster, String> {
+    let limits = png::Limits {
+        bytes: usize::try_from(2 * MOST_PIXELS).unwrap_or(usize::MAX),
+    };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
-    let (colour, depth) = reader.output_color_type();
-    if !matches!(colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
-        return Err(format!("the pixels are {colour:?}; {ADVICE}"));
-    }
-    let size = reader
-        .output_buffer_size()
-        .filter(|n| *n <= LARGEST_MAP)
-        .ok_or("it is too large")?;
-    let mut buffer = vec![0; size];
+    let (_, depth) = reader.output_color_type();
+    check_size([reader.info().width, reader.info().height].map(u64::from), size)?;
+    let length = reader.output_buffer_size().ok_or("it is too large")?;
+    let mut buffer = vec![0; length];
     let info = reader.next_frame(&mut buffer).map_err(|e| e.to_string())?;
     let shape = (info.height as usize, info.width as usize);
-    let samples = match depth {
+    let mut samples: Vec<u32> = match depth {
         png::BitDepth::Sixteen => buffer
             .chunks_exact(2)
             .map(|b| u32::from(u16::from_be_bytes([b[0], b[1]])))
@@ -97,11 +177,37 @@ pub(crate) fn parse_png(bytes: &[u8]) -> Result<Array2<u32>, String> {
         png::BitDepth::Eight => buffer.into_iter().map(u32::from).collect(),
         depth => unpack(&buffer, shape.1, depth as u8).map(u32::from).collect(),
     };
-    shaped(shape, samples)
+    let black = black_place(reader.info());
+    let mut findings = Vec::new();
+    if let Some(black) = black.filter(|black| samples.contains(black)) {
+        // Label 0 is free: its place takes the number that black had.
+        samples.iter_mut().for_each(|l| {
+            *l = if *l == black {
+                0
+            } else if *l == 0 {
+                black
+            } else {
+                *l
+            }
+        });
+        findings.push(Finding::new(
+            "binder-colour",
+            format!("black, place {black} of the PNG's palette, was taken as the binder"),
+        ));
+    }
+    Ok(LabelRaster::of((shaped(shape, samples)?, findings)))
+}
+
+/// The place of black in a palette that does not begin with it.
+fn black_place(info: &png::Info<'_>) -> Option<u32> {
+    let palette = info.palette.as_ref()?;
+    let mut colours = palette.chunks_exact(3);
+    let place = colours.position(|c| c == [0, 0, 0])?;
+    u32::try_from(place).ok().filter(|place| *place > 0)
 }
 
 /// Labels of a NumPy array of two axes (or with further ones of length 1): whole numbers of any kind.
-pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array2<u32>, String> {
+pub(crate) fn parse_npy(bytes: &[u8]) -> Result<LabelRaster, String> {
     let damaged = || "the NumPy header cannot be understood".to_owned();
     let long = bytes.get(6).ok_or_else(damaged)? > &1;
     let length = bytes.get(8..if long { 12 } else { 10 }).ok_or_else(damaged)?;
@@ -137,7 +243,7 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array2<u32>, String> {
         ));
     };
     let data = &bytes[start + length..];
-    let (order, kind) = kind.split_at(1);
+    let (order, kind) = kind.split_at_checked(1).ok_or_else(damaged)?;
     let size: usize = kind.get(1..).and_then(|n| n.parse().ok()).ok_or_else(damaged)?;
     let count = height
         .checked_mul(width)
@@ -148,49 +254,35 @@ pub(crate) fn parse_npy(bytes: &[u8]) -> Result<Array2<u32>, String> {
             data.len()
         ));
     }
-    let number = |b: &[u8]| -> Result<u32, String> {
+    let number = |b: &[u8]| -> Option<f64> {
         let mut little = [0_u8; 8];
-        for (to, from) in little.iter_mut().zip(b.iter()) {
-            *to = *from;
-        }
+        little.iter_mut().zip(b).for_each(|(to, from)| *to = *from);
         if order == ">" {
-            little[..size].reverse();
+            little.get_mut(..size)?.reverse();
         }
         let bits = u64::from_le_bytes(little);
-        match (kind.as_bytes()[0], size) {
-            (b'b' | b'u', 1 | 2 | 4 | 8) => whole(bits as f64),
+        match (kind.as_bytes().first()?, size) {
+            (b'b' | b'u', 1 | 2 | 4 | 8) => Some(bits as f64),
             (b'i', 1 | 2 | 4 | 8) => {
                 let unused = 64 - 8 * index(size);
-                whole(((bits << unused).cast_signed() >> unused) as f64)
+                Some(((bits << unused).cast_signed() >> unused) as f64)
             }
-            (b'f', 4) => whole(f64::from(f32::from_le_bytes([
-                little[0], little[1], little[2], little[3],
-            ]))),
-            (b'f', 8) => whole(f64::from_bits(bits)),
-            _ => Err(format!("numbers of type {order}{kind}; {ADVICE}")),
+            (b'f', 2 | 4 | 8) => Some(float(bits, 8 * size)),
+            _ => None,
         }
     };
-    let samples = data.chunks_exact(size).map(number).collect::<Result<Vec<_>, _>>()?;
+    if number(&[0; 8]).is_none() {
+        return Err(format!("numbers of type {order}{kind}; {ADVICE}"));
+    }
+    let samples = data.chunks_exact(size).map(|b| number(b).unwrap_or(f64::NAN));
     if fortran {
-        return Ok(shaped((width, height), samples)?
-            .reversed_axes()
-            .as_standard_layout()
-            .into_owned());
+        let (labels, findings) = number_labels((width, height), samples)?;
+        return Ok(LabelRaster::of((
+            labels.reversed_axes().as_standard_layout().into_owned(),
+            findings,
+        )));
     }
-    shaped((height, width), samples)
-}
-
-/// A label as a whole number of at least 0.
-fn whole(value: f64) -> Result<u32, String> {
-    if value < 0.0 {
-        return Err(format!("the label {value} is negative; {ADVICE}"));
-    }
-    if value.fract() != 0.0 || value > f64::from(u32::MAX) {
-        return Err(format!(
-            "the label {value} is not a whole number of at most 32 bits; {ADVICE}"
-        ));
-    }
-    Ok(index(whole_part(value)))
+    Ok(LabelRaster::of(number_labels((height, width), samples)?))
 }
 
 /// Samples of fewer than eight bits, rows beginning on a byte.
@@ -203,12 +295,6 @@ fn unpack(packed: &[u8], columns: usize, bits: u8) -> impl Iterator<Item = u8> {
                 .map_or(0, |b| b >> (8 - usize::from(bits) * (x % each + 1)) & mask)
         })
     })
-}
-
-fn shaped(shape: (usize, usize), samples: Vec<u32>) -> Result<Array2<u32>, String> {
-    let (found, wanted) = (samples.len(), shape.0 * shape.1);
-    Array2::from_shape_vec(shape, samples)
-        .map_err(|_| format!("{found} samples for {wanted} pixels: more than one channel; {ADVICE}"))
 }
 
 /// Writes a TIFF of one page, u16 where the largest label fits and u32 otherwise.

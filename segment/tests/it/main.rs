@@ -9,6 +9,10 @@
 
 mod drawn;
 mod files;
+mod label_kinds;
 mod labels;
+mod made_files;
+mod mutations;
 mod photos;
+mod pictures;
 mod scales;

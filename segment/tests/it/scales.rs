@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::{FilterType, blur, resize};
 use image::{Rgb, RgbImage};
-use stereology_segment::{Compression, SegmentOptions, Segmentation, read_photo_up_to, segment};
+use stereology_segment::{Compression, PhotoOptions, SegmentOptions, Segmentation, read_photo_with, segment};
 
 use crate::drawn::{discs, photo};
 
@@ -52,7 +52,7 @@ fn quality_of_jpeg_does_not_matter() {
             JpegEncoder::new_with_quality(&mut out, quality)
                 .encode_image(&picture)
                 .unwrap();
-            let read = read_photo_up_to(&file, u64::MAX).unwrap();
+            let read = read_photo_with(&file, &PhotoOptions::default()).unwrap();
             assert!(read.compression.is_some());
             let found = run(&read.photo, 1.0, read.compression);
             assert_same(summary(&found, 1.0), plain, &format!("quality {quality}, seed {seed}"));

@@ -34,21 +34,28 @@ pub fn write(
 ) -> Result<(), FileError> {
     Ok(write_atomically(path, |out| {
         head.write(out)?;
-        writeln!(out, "{HEADER}")?;
+        // Without a photo there are no colours.
+        let header = if segmentation.has_colours {
+            HEADER.to_owned()
+        } else {
+            HEADER.replace("r,g,b,", "")
+        };
+        writeln!(out, "{header}")?;
         segmentation.profiles.iter().try_for_each(|p| {
             let [r, g, b] = p.colour.map(|c| 255.0 * c);
             write!(
                 out,
-                "{},{},{},{},{},{r},{g},{b},{},{},{}",
+                "{},{},{},{},{}",
                 p.id,
                 p.x * scale,
                 p.y * scale,
                 p.area * scale * scale,
                 p.size * scale,
-                p.category,
-                u8::from(p.touches_edge),
-                p.weight
             )?;
+            if segmentation.has_colours {
+                write!(out, ",{r},{g},{b}")?;
+            }
+            write!(out, ",{},{},{}", p.category, u8::from(p.touches_edge), p.weight)?;
             let [left, top, right, bottom] = p.bounding_box.map(|side| side as f64 * scale);
             write!(out, ",{left},{top},{right},{bottom},{}", p.pixels)?;
             match p.shape {

@@ -15,19 +15,23 @@ use stereology::metrics::{
     BlockSource, BlockTest, Comparison, Family, FamilyError, Figure, block_test, copying, sections, sections_inside,
 };
 use stereology::pipeline::{CompareOptions, Level, compare_solid};
-use stereology::segment::read_photo;
+use stereology::segment::{PhotoFile, read_photo_with};
 use stereology::spectrum::BandPass;
 
 use crate::answer::{Answer, Fields, Notes};
 use crate::everywhere::Everywhere;
 use crate::failure::{Explain, Failure};
 use crate::outputs::{Output, write_text};
+use crate::pictures::ImageLimit;
 use crate::progress::{Step, go_on};
 use crate::values::{count, pair, positive};
 use crate::warnings::Warning;
 use figures::{Figures, VerdictFields};
 use geometry::PhasesFields;
 use stereology_report::{MeasureReport, significant};
+
+/// Memory for each pixel of an image, bytes.
+const BYTES_PER_PIXEL: u64 = 100;
 
 /// Measures how similar the slices of a volume are to an image, or to the slices of another volume
 ///
@@ -46,6 +50,8 @@ pub struct Measure {
     pub exemplar: PathBuf,
     /// Volume to measure: .npy, .nrrd or .tif
     pub volume: PathBuf,
+    #[command(flatten)]
+    pub limit: ImageLimit,
     /// Families of slices to measure: any of xz, yz, xy
     #[arg(long, value_name = "FAMILIES", default_value = "xz,yz,xy")]
     pub slices: Families,
@@ -100,7 +106,7 @@ const LEAST_INSIDE: usize = 16;
 /// An image or volume with values 0 to 1.
 struct Samples {
     values: Array4<f32>,
-    guessed: Option<Warning>,
+    guessed: Vec<Warning>,
 }
 
 /// JSON of `stereology measure`.
@@ -232,15 +238,15 @@ impl Measure {
             .map(|output| everywhere.outputs.file(output))
             .transpose()?;
         let mut notes = Notes::default();
-        let exemplar = read(&self.exemplar, self.exemplar_range, "--exemplar-range")?;
-        let volume = read(&self.volume, self.range, "--range")?;
+        let exemplar = read(&self.exemplar, self.exemplar_range, "--exemplar-range", self.limit)?;
+        let volume = read(&self.volume, self.range, "--range", self.limit)?;
         if volume.values.dim().0 == 1 && self.slices.0 != [Family::Xy] {
             return Err(Failure::run(format!(
                 "{} is an image, not a volume; to compare it as a single slice, give --slices xy",
                 self.volume.display()
             )));
         }
-        for warning in [exemplar.guessed, volume.guessed].into_iter().flatten() {
+        for warning in [exemplar.guessed, volume.guessed].concat() {
             notes.warn(warning);
         }
         let mask = self.inside(&volume.values)?;
@@ -490,7 +496,7 @@ fn fields(
 }
 
 /// Reads samples and scales them to 0 to 1.
-fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, Failure> {
+fn read(path: &Path, range: Option<[f32; 2]>, option: &str, limit: ImageLimit) -> Result<Samples, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let is_tiff = matches!(ending.as_deref(), Some("tif" | "tiff"));
     let stored = match ending.as_deref() {
@@ -498,24 +504,27 @@ fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, F
         Some("tif" | "tiff") => match read_volume(path) {
             Ok(stored) => stored,
             // Images use more TIFF variants than volumes.
-            Err(error) => match read_photo(path) {
-                Ok(photo) => return Ok(of_photo(&photo)),
+            Err(error) => match read_photo_with(path, &limit.options(BYTES_PER_PIXEL)) {
+                Ok(photo) => return Ok(of_photo(photo, path)),
                 Err(_) => return Err(error).at(path),
             },
         },
-        _ => return read_photo(path).map(|photo| of_photo(&photo)).at(path),
+        _ => {
+            let read = read_photo_with(path, &limit.options(BYTES_PER_PIXEL));
+            return read.map(|photo| of_photo(photo, path)).at(path);
+        }
     };
     let (mut values, kind) = (stored.samples, stored.sample_type);
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (low, high) = finite().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-    let mut guessed = None;
+    let mut guessed = Vec::new();
     let [black, white] = match (range, kind.white()) {
         (Some([black, white]), _) if black < white => [black, white],
         (Some(_), _) => return Err(Failure::usage(format!("{option}: LOW must be below HIGH"))),
         (None, Some(white)) => [0.0, white],
         _ if low >= 0.0 && high <= 1.0 && matches!(kind, SampleType::F32 | SampleType::F64) => [0.0, 1.0],
         _ if low < high => {
-            guessed = Some(Warning::new(
+            guessed.push(Warning::new(
                 "range-guessed",
                 format!("{}: {low} was taken as black and {high} as white", name(path)),
             ));
@@ -533,7 +542,10 @@ fn read(path: &Path, range: Option<[f32; 2]>, option: &str) -> Result<Samples, F
 }
 
 /// Samples of an image; one channel if it is grey.
-fn of_photo(photo: &RgbImage) -> Samples {
+fn of_photo(PhotoFile { photo, findings, .. }: PhotoFile, path: &Path) -> Samples {
+    let named = findings
+        .into_iter()
+        .map(|f| Warning::new(f.code, format!("{}: {}", name(path), f.message)));
     let is_grey = photo.pixels().all(|p| p[0] == p[1] && p[1] == p[2]);
     let shape = (
         1,
@@ -545,7 +557,7 @@ fn of_photo(photo: &RgbImage) -> Samples {
         values: Array4::from_shape_fn(shape, |(_, y, x, c)| {
             f32::from(photo.get_pixel(x as u32, y as u32)[c]) / 255.0
         }),
-        guessed: None,
+        guessed: named.collect(),
     }
 }
 
